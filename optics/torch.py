@@ -135,7 +135,7 @@ def _images(
     At coarse tolerances, PyTorch computes members with the same pupil and sensor distance as one stack, on the device
     `place`. Dr.Jit computes all other members.
 
-    light, numbers: pupils, distances and angle, and the tensors in these: {"pupils[0].aperture_radius": tensor}.
+    light, numbers: the batch, and those of its numbers that are tensors: {"pupils[0].aperture_radius": tensor}.
     fixed: the batch `light` with plain numbers instead of tensors, without derivatives.
     """
     convert = partial(on_device, place) if numbers or place.type != "cpu" else np.asarray
@@ -191,9 +191,9 @@ def camera_image(scene: Any, pupil: Pupil, sensor: camera.Sensor, *, device: Any
 def eye_signals(
     eye: Eye, radiance: np.ndarray, samples_per_receptor: int, rng: Any = None, z: Any = math.inf, *, device: Any = None
 ) -> torch.Tensor:
-    """Return the signals of `optics.Eye.see` as a tensor (channel, h, w) with gradients to the tensors in the eye.
+    """Return the signals of `optics.Eye.see`, (channel, h, w), differentiable with respect to the eye's tensors.
 
-    eye: an eye. Its field of view may be a tensor. The numbers of its pupil that may be tensors are listed in `psf`.
+    eye: an eye. Its field of view may be a tensor. `psf` lists the parameters of the eye's pupil that may be tensors.
     radiance, samples_per_receptor, rng, z: see `optics.Eye.see`. Of these, only the distance z carries a gradient.
     device: device of the result, see `psf`.
 
@@ -209,7 +209,7 @@ def eye_signals(
 
 
 def _operation(compute: Callable[[Any], Any], element: Any, device: Any) -> torch.Tensor:
-    """Return compute(element) as a tensor with gradients to the tensors that `element`, for example a pupil, holds."""
+    """Return compute(element) as a tensor, differentiable with respect to the tensors in `element`."""
     numbers = torch_numbers(element)
     place = torch.device(device) if device is not None else common_device(numbers)
     if not numbers or not torch.is_grad_enabled():
@@ -223,7 +223,7 @@ def _operation(compute: Callable[[Any], Any], element: Any, device: Any) -> torc
 
 
 def _former_pupil(heights: Any, given: Mapping[str, Any]) -> Any:
-    """Return the pupil for the former arguments of `psf`; ValueError if heights are passed without a radius."""
+    """Return the pupil that deprecated arguments of `psf` describe; ValueError if there are heights but no radius."""
     if heights is None and given.keys() == {"pupil"}:
         return given["pupil"]
     heights = of_kind("heights", given.get("heights", heights), torch.Tensor, "torch.zeros(4, 4)")

@@ -26,7 +26,7 @@ class EpisodeFailure:
 
 
 def episode_failures_of(candidates: Iterable[Candidate]) -> list[EpisodeFailure]:
-    """Return the failures that ended episodes of the candidates, the most frequent failure first."""
+    """Return the failures that ended the candidates' episodes in training or evaluation, the most frequent first."""
     episodes, affected = Counter[str](), Counter[str]()
     for candidate in candidates:
         for said, number in candidate.episode_failures:

@@ -19,7 +19,10 @@ def any_costs(candidates: Iterable[Candidate]) -> bool:
 
 
 def fitness_label(costs: bool) -> str:
-    """Return the label of an axis that shows fitness, with or without costs."""
+    """Return the label of an axis that shows fitness.
+
+    costs: True if the fitness is reduced by costs
+    """
     return "fitness (mean return − costs)" if costs else "fitness (mean return)"
 
 

@@ -67,8 +67,8 @@ class Trajectory:
     """One quantity of the phenotypes over the generations. All arrays have the shape (generation,).
 
     generations: numbers of the generations
-    low, median, high: 10 % quantile, median and 90 % quantile in each population; values that are not finite are
-        ignored, and the result is NaN if there are no others
+    low, median, high: 10 % quantile, median and 90 % quantile in each population; only finite values are used,
+        and the result is NaN if there are none
     best: value of the quantity in the best candidate so far; NaN before a candidate has succeeded, or if the best one
         lacks the quantity
     """
@@ -119,7 +119,7 @@ def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationSta
 
 
 def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], float]) -> Trajectory:
-    """Return quantiles of a quantity in each generation, and the quantity of the best candidate up to this generation.
+    """Return quantiles of a quantity in each generation, and the quantity of the best candidate so far.
 
     Failed candidates also have a phenotype, so the quantiles include them.
 

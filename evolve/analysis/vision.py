@@ -50,14 +50,14 @@ UNDEFINED = Vision(math.nan, math.nan, math.nan, math.nan)
 
 
 def vision(animal: Phenotype, config: RunConfig) -> Vision:
-    """Return image quality, contrast, PSNR and structural similarity of an animal's eyes in the run's task.
+    """Return four measures of an animal's eyes: image quality, contrast, PSNR and structural similarity.
 
-    `Vision` defines these measures. All of them are NaN for compound eyes, and if the PSF cannot be computed accurately
-    enough.
+    `Vision` defines these measures. The last two compare images of scenes in the run's task. All four are NaN for
+    compound eyes, and if the PSF cannot be computed accurately enough.
 
     Raises:
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
-        ValueError: the eyes cannot be placed in the user task; see `evolve.learning.animal_task.with_phenotype`.
+        ValueError: the user task's animal cannot have these eyes; see `evolve.learning.animal_task.with_phenotype`.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     medium = config.world.medium

@@ -21,7 +21,8 @@ class WhiteLight:
     """An eye, its PSF in each band (`psf`) and in white daylight (`white`), its MTF, image quality and contrast.
 
     Raises:
-        optics.AccuracyError: the PSF (in `from_eye`) or a measure (on access) cannot be computed accurately enough.
+        optics.AccuracyError: the PSF or a measure cannot be computed accurately enough. `from_eye` computes the PSF.
+            The MTF and the measures are computed when they are first read.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
 

@@ -1,4 +1,4 @@
-"""Conversion of command-line arguments to whole numbers within a range, and of error messages to one line."""
+"""Functions that convert command-line arguments to whole numbers, and that shorten an error message to one line."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def seed(text: str) -> int:
 
 
 def every(text: str) -> int:
-    """Return the number of actions from one recorded frame to the next, from the text of an argument.
+    """Return the number N that an argument specifies as text: a frame is recorded after every N actions.
 
     Raises:
         ArgumentTypeError: the text is not a whole number from 1 to 1,000,000.

@@ -70,8 +70,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the parsed arguments.
 
     Raises:
-        SystemExit: with code 0 if there are no arguments, or if the arguments request help or the version. With code 2,
-            after one line is printed, if an argument is invalid.
+        SystemExit: the exit code is 0 if there are no arguments, or if the arguments request help or the version. If an
+            argument is invalid, one line is printed, and the exit code is 2.
     """
     parser = build_parser()
     if not arguments:
@@ -277,7 +277,7 @@ def _add_tables(commands: Commands) -> None:
 def _command(
     commands: Commands, name: str, home: str, meaning: str, directory: bool = False
 ) -> argparse.ArgumentParser:
-    """Add a command, which the function `home` runs ("module.function" in `evolve.cli.commands`); return its parser."""
+    """Add a command; return its parser. `home` names its function in `evolve.cli.commands`: "module.function"."""
     parser = commands.add_parser(
         name,
         help=meaning,

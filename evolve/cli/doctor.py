@@ -80,12 +80,13 @@ def examine() -> dict[str, object]:
     gpu: name of the first NVIDIA GPU, or "none"
     device: device for PSFs, eyes and rays, or the reason why it cannot be used
     free_memory: free memory [bytes]; None if it is unknown
-    light_cache: folder of the light tables, and the error that prevents writing there (None if there is none)
+    light_cache: folder of the light tables (tables of the light that walls and floor reflect to each other), and the
+        error that prevents writing there (None if there is none)
     packages: version of each package, or "not installed"
     llvm: all LLVM libraries that were tested
     variants: state of each tested variant of Mitsuba
-    notes: messages about the operating system, and about files that Python imports instead of packages of rhabdom,
-        because they have the same name
+    notes: messages about the operating system, and about files that have the same name as a package of rhabdom, so
+        that Python imports them instead of the package
     good: True if all parts that `evolve run` needs work
     """
     chosen, tried = backend.find(cached=False)

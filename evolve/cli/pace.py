@@ -59,13 +59,16 @@ class Pace:
     def candidate_s(self, config: RunConfig) -> float:
         """Return the time for training and evaluating one candidate [s].
 
-        The result assumes that training is not divided into rungs, stages after which only the better candidates
-        continue.
+        The result assumes that training is not divided into rungs. A rung is a stage of training, after which only the
+        better candidates continue.
         """
         return self.rung_s(config.learning, 0, config.learning.total_steps)
 
     def rung_s(self, learning: LearningConfig, begin: int, end: int) -> float:
-        """Return the time [s] for one rung (training from `begin` to `end` steps) and for its evaluations."""
+        """Return the time for one rung, a stage of training from `begin` to `end` steps [s].
+
+        The result includes the evaluations of the policy in this rung.
+        """
         plays = -(-(end - begin) // learning.eval_interval) + 1
         return self.start_s + self.training_s(learning, begin, end) + plays * self.play_s
 
@@ -81,8 +84,8 @@ class Pace:
 def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:
     """Return the pace for each animal, by the animal's name: how fast one worker process trains and evaluates it.
 
-    All workers measure at the same time. If several workers train the same animal, their measurements differ. For each
-    field of `Pace`, the result then contains the measured value from which the longest duration of the run follows.
+    All workers measure at the same time. If several workers train the same animal, their measurements differ. Each
+    field of `Pace` then has the most cautious of the measured values, which predicts the longest duration of the run.
 
     animals: animals that are trained for the measurement, by name
     workers: number of worker processes
@@ -147,9 +150,9 @@ def _slowest(paces: list[Pace]) -> Pace:
 def _timed_training(config: RunConfig, animal: Phenotype, seed: int, policy: Path) -> Pace:
     """Time a training run of three short rollouts, followed by the evaluations.
 
-    The first update makes all passes over the samples. The second update makes only half as many, unless the settings
-    keep the number of passes higher. The time of one pass follows from the difference between the times of the two
-    updates.
+    The first update makes all passes over the samples. The second update makes only half as many, or
+    `learning.least_epochs` passes if this number is larger. The time of one pass follows from the difference between
+    the times of the two updates.
 
     policy: path to which the trained policy is written. The parent process removes the folder of this file, even after
         Ctrl-C

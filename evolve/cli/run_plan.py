@@ -77,9 +77,9 @@ class RunPlan:
 
     @property
     def hours(self) -> dict[str, float]:
-        """Predicted wall time of the run [h], by the name of the animal from whose measured speed it follows.
+        """Predicted wall times of the run [h], one for each measured animal, by the animal's name.
 
-        The prediction assumes that all candidates take the same time as this animal, and that they complete their
+        A prediction assumes that all candidates take the same time as the animal, and that they complete their
         training.
         """
         search, learning = self.config.search, self.config.learning

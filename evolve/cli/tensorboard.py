@@ -52,7 +52,7 @@ class TensorBoardWriter:
             writer.close()
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
-        """Do nothing while a candidate trains, because only scalars from the record are written."""
+        """Do nothing while a candidate trains: its scalars are written after its evaluation."""
 
     def evaluated(self, candidate: Candidate) -> None:
         """Write the scalars of a candidate that has completed a rung, a stage of its training.

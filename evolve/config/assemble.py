@@ -1,8 +1,8 @@
 """Assembly of a run's configuration from all sources of settings.
 
-The sources are the defaults, the preset and its scale, the task's default settings, a TOML file, an animal of another
-run, and `--set key=value`, in this order. Later sources override earlier ones. There is one exception: the preset
-overrides the settings of the task if the preset was made for this task.
+The sources are the defaults, the preset, the preset's settings for shorter or longer runs (its scale), the task's
+default settings, a TOML file, an animal of another run, and `--set key=value`, in this order. Later sources override
+earlier ones. There is one exception: a preset that was made for this task overrides the settings of the task.
 """
 
 from __future__ import annotations
@@ -90,7 +90,8 @@ def assemble(
 def _assembled(below: list[Source], above: list[Source]) -> RunConfig:
     """Return the configuration that follows from default settings of the task and from other sources of settings.
 
-    Sources in `above`, such as files and options, override those in `below`, a preset, and the settings of the task.
+    below: sources of a preset
+    above: other sources, such as files and options; they override the preset and the default settings of the task
     """
     known_task = [source.tree["task"] for source in (*below, *above) if "task" in source.tree]
     if not known_task:
@@ -132,10 +133,11 @@ def _read_back(written: Source) -> RunConfig:
 
 
 def _user_settings(source: Source, code: TaskCode | None) -> Source:
-    """Return the settings of a user's file or option `--set`. The file may be the config.toml of another run.
+    """Return the settings from a source of the user: either a file or an option `--set`.
 
-    The config.toml must have format 2 or a later one, because settings of format 1 can have another meaning. A file
-    cannot select a user task, because the user must name code on the command line or in a Python call.
+    A file may be the config.toml of another run. It must then have format 2 or a later one, because settings of format
+    1 can have another meaning. Neither source can select a user task, whose code is executed: the user must name the
+    task on the command line or in a Python call.
     """
     if names_code(source.tree.get("task")) and code is None:
         raise ConfigError(
@@ -165,7 +167,7 @@ def to_toml(config: RunConfig) -> str:
 
 
 def _checked(source: Source) -> Tree:
-    """Return the checked settings of a source, such as a file. A setting of a group of genes becomes one of each gene.
+    """Return the checked settings of a source, such as a file. Settings of a group are copied to each of its genes.
 
     Raises:
         ConfigError: a key or a value is invalid; the message names the source and, if known, the line.
@@ -179,9 +181,9 @@ def _checked(source: Source) -> Tree:
 
 
 def _blamed(error: ConfigError, layers: Iterable[Source]) -> str:
-    """Return the locations of contradicting settings as text, such as " (mine.toml, line 3; --set ...)".
+    """Return the locations of the settings that cause an error, as text such as " (mine.toml, line 3; --set ...)".
 
-    If several sources contain a setting, the location is that of the effective value.
+    If several sources contain a setting, its location is in the source that overrides the others.
     """
     effective = [next((at for s in reversed(list(layers)) if (at := s.place(key))), None) for key in error.keys]
     places = list(dict.fromkeys(place for place in effective if place))
@@ -212,10 +214,7 @@ def _checked_entry(key: str, value: Any) -> Any:
 
 
 def _checked_genome(section: Tree) -> Tree:
-    """Return the settings of each gene after a check.
-
-    Settings of a group of genes apply to each of them. Settings of a smaller group override those of a larger one.
-    """
+    """Return the checked settings of each gene. Settings of a smaller group of genes override those of a larger one."""
     result: Tree = {}
     for group in sorted(section, key=lambda name: -len(group_members(name))):
         key, members, use = f"genome.{group}", group_members(group), section[group]
@@ -250,7 +249,7 @@ def _merge(below: Tree, above: Tree) -> Tree:
 
 
 def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
-    """Check the genes that a source of settings names individually: animals with these eyes must have them.
+    """Check that animals with these eyes can have all genes that a source, such as a file, names individually.
 
     Settings of a group of genes, such as `genome.optical`, are not checked: they apply to those genes that exist.
 

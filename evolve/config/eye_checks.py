@@ -68,10 +68,10 @@ def _check_light(eye: EyeConfig) -> None:
 
 
 def _check_compound(eye: EyeConfig) -> None:
-    """Check that compound eyes have optics, and that settings for the other kind of eyes have their defaults.
+    """Check that settings suit the kind of eyes, compound or camera eyes, and that compound eyes have optics.
 
-    Eyes are either compound or camera eyes. For camera eyes, `eye.facet_area` must have its default. For compound eyes,
-    all settings that only camera eyes use, such as `eye.sensor_width`, must have their defaults.
+    For camera eyes, `eye.facet_area` must have its default. For compound eyes, all settings that only camera eyes use,
+    such as `eye.sensor_width`, must have their defaults.
 
     Raises:
         ConfigError: one of these conditions is not met.

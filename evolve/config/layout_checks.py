@@ -24,8 +24,9 @@ def check_layouts(world: WorldConfig) -> None:
     """Check the settings of layouts, the arrangements of walls in courses and mazes.
 
     The setting `world.layouts` determines whether layouts are fixed or random. Some settings affect only fixed layouts,
-    and others only random ones. Settings without effect must have their defaults. Choices, such as that of a course,
-    must be known. The numbers of rows and columns and the width of paths must be odd.
+    and others only random ones. Settings without effect must have their defaults. A setting with a list of possible
+    values, such as `world.course`, must have one of them. The numbers of rows and columns and the width of paths must
+    be odd.
 
     Raises:
         ConfigError: one of these conditions is not met.

@@ -61,9 +61,10 @@ def coarse_bands(config: RunConfig) -> list[str]:
 
 
 def _most_light(config: RunConfig) -> float:
-    """Return the signal of a white surface behind the widest pupil of any animal.
+    """Return the largest signal that a white surface can cause in an eye of this search.
 
-    The unit is the signal behind a pupil with relative aperture 1. A perfect lens and compound eyes have the signal 1.
+    In a camera eye, it is the signal behind the widest pupil that the genes allow, relative to the signal behind a
+    pupil with relative aperture 1. With perfect lenses and in compound eyes, the signal of white is always 1.
     """
     if not config.eye.optics or config.eye.compound:
         return 1.0
@@ -81,10 +82,10 @@ def _doublings(bands: int) -> list[int]:
 def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
     """Return the sets of receptor types for which `coarse_bands` computes errors of signals.
 
-    A set is a name such as "rgb", or the peak wavelengths of the types [nm]. If genes determine these peaks, each gene
-    that the search varies takes values over its range in turn, while the others keep their start values. Other
-    combinations may cause larger errors. In the preset `ultraviolet`, whose peaks lie far apart, a test of all
-    combinations would find an error that is a third larger.
+    A set is a name such as "rgb", or the peak wavelengths of the types [nm]. If genes determine these peaks, the genes
+    that the search varies are changed one at a time: one takes several values over its range, while the others keep
+    their start values. Other combinations may cause larger errors. In the preset `ultraviolet`, whose peaks lie far
+    apart, a test of all combinations would find an error that is a third larger.
     """
     if config.eye.receptors != INHERITED:
         return [config.eye.receptors]
@@ -121,7 +122,7 @@ def idle_genes(config: RunConfig) -> list[str]:
 
 
 def _idle_glass(uses: Mapping[str, GeneConfig], relief: list[str]) -> list[str]:
-    """Return warnings about open genes (genes that the search varies) of a pupil's relief that have no effect.
+    """Return warnings about genes of a pupil's relief that the search varies although they have no effect.
 
     If the refractive index is fixed at 1, the genes of the heights and of dispersion have no effect. If the relief is
     fixed and flat, the two genes of its material (refractive index and dispersion) have no effect.
@@ -160,7 +161,10 @@ def idle_settings(config: RunConfig) -> list[str]:
 
 
 def idle_starts(config: RunConfig) -> list[str]:
-    """Return warnings about genes whose start value was changed although it has no effect, one line per reason."""
+    """Return warnings about genes that have no effect although their start values were changed, one line per cause.
+
+    Optical genes have no effect without optics, and spectral genes have none if receptor types are not inherited.
+    """
     unread = {"optical": f"eye.optics = {config.eye.optics}".lower()} if not config.eye.optics else {}
     if config.eye.receptors != INHERITED:
         unread["spectral"] = f"eye.receptors = {config.eye.receptors}, not {INHERITED}"

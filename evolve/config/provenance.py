@@ -48,8 +48,8 @@ class Source:
 def _spellings(key: str) -> Iterator[list[str]]:
     """Yield the parts of a dotted key.
 
-    If the key belongs to a gene, also yield parts in which the name of a group that contains the gene, such as
-    "optical", replaces the gene's name. The smallest group comes first.
+    If the key belongs to a gene, also yield the keys of the groups that contain the gene, the smallest group first. In
+    these keys, the name of the group (for example "optical") replaces the name of the gene.
     """
     path = key.split(".")
     yield path
@@ -59,10 +59,10 @@ def _spellings(key: str) -> Iterator[list[str]]:
 
 
 def _line_of(text: str, path: list[str]) -> int | None:
-    """Return the number of a setting's last line; None if a value in the text spans more than 100 lines.
+    """Return the number of a setting's last line; None if the search meets a value of more than 100 lines.
 
-    tomllib does not report line numbers. If the first n lines contain the setting, any larger number of lines also
-    contains it. Bisection therefore finds the smallest n.
+    That value may belong to another setting. tomllib does not report line numbers. If the first n lines contain the
+    setting, any larger number of lines also contains it. Bisection therefore finds the smallest n.
     """
     lines = text.splitlines(keepends=True)
     low, high = 0, len(lines)  # the first `low` lines do not contain the setting; the first `high` lines do

@@ -1,4 +1,4 @@
-"""Conversion of start values for the genes of a pupil's relief to reliefs that have more points or are symmetric."""
+"""Adaptation of the start values of relief genes to eyes whose reliefs have more points or are symmetric."""
 
 from __future__ import annotations
 
@@ -62,7 +62,10 @@ def _patches(eye: EyeConfig) -> list[list[str]]:
 
 
 def _spelled_out(genes: Tree) -> int:
-    """Return N if the relief genes that have start values are those of a relief of N x N points, else 0."""
+    """Return the number of points along each side of the relief for which `genes` contains all start values.
+
+    The result is 0 if the genes with start values are not exactly the genes of one relief without symmetry.
+    """
     given = _with_start(genes)
     return next((side for side in range(PATCH, int(RELIEF_POINTS.high) + 1) if given == set(doe_names(side))), 0)
 

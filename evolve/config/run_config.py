@@ -63,8 +63,8 @@ class RunConfig:
     workers: number of worker processes; 0: one per core
     task_sha256: SHA-256 of a user task's file; "" for a built-in task
     genome: settings of each gene of the animals (`GeneConfig`), by name. The search must vary at least one gene
-    code: code of the user task, if the user has named the task in the command or call; else None. The code of a task
-        that is named only in a file is never executed
+    code: code of the user task, if the user has named the task on the command line or in a Python call; else None. The
+        code of a task that is named only in a file is never executed
 
     The other fields are sections of settings; the classes of the sections describe them.
 
@@ -144,7 +144,7 @@ class RunConfig:
             )
 
     def _check_world(self) -> None:
-        """Check the settings of layouts. Those that the task lacks must have their defaults."""
+        """Check the settings of layouts. A setting that the task lacks must have its default value."""
         self._check_settings((*OF_MAZES, *OF_COURSES, *OF_LAYOUTS, PATH_WIDTH))
         check_layouts(self.world)
 
@@ -166,9 +166,9 @@ class RunConfig:
                 raise ConfigError(f"{key}: is for {whose}, not for {self.task}", key, "task")
 
     def _check_clusters(self) -> None:
-        """Check that the search varies at least one gene, and no optical or spectral genes that have no effect.
+        """Check that the search varies a gene, and that the optical and spectral genes that it varies have an effect.
 
-        Optical genes need optics, and spectral genes need receptor types that are inherited.
+        Optical genes have an effect only with optics, and spectral genes only if receptor types are inherited.
 
         Raises:
             ConfigError: one of these conditions is not met.
@@ -276,8 +276,8 @@ class RunConfig:
         named: file and class of the task, "FILE.py:CLASS"
 
         Raises:
-            ConfigError: the run has no user task, the class has another name, or the file cannot be read or has
-                changed.
+            ConfigError: the run has no user task, the class has another name, the file cannot be read, or its content
+                has changed since the run began.
         """
         return replace(self, code=self.choice.read(named))
 

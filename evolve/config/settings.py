@@ -98,8 +98,8 @@ class WorldConfig:
         """Arguments of `sim.build_world` that define the worlds in which final results are measured.
 
         If `world.layouts` requests a family of random layouts, the worlds have the layouts of the family's test set,
-        which neither training nor selection uses. If the layouts are fixed, final results are measured in the same
-        worlds as fitness.
+        which neither training nor selection uses. If the layouts are fixed, the worlds are those in which fitness is
+        evaluated.
         """
         return {**self.evaluation, **self._walls("test")}
 
@@ -218,7 +218,7 @@ class WiringConfig:
     `evolve config schema` describes each field.
 
     `pool_side` has no effect along an axis with at most `pool_side` receptors. `repeat_side` has no effect along an
-    axis if at least `repeat_side` signals remain there after averaging. Both must be 0 for compound eyes.
+    axis with at least `repeat_side` signals after the averaging by `pool_side`. Both must be 0 for compound eyes.
     """
 
     shared_encoder: bool = setting(False, None, "all eyes have the same encoder, with the same weights")

@@ -88,7 +88,7 @@ def preset_sources(name: str | None, scale: str | None) -> list[Source]:
 def task_defaults(task: Any) -> Source:
     """Return the default settings of a task from evolve/config/tasks/TASK.toml.
 
-    The source has no settings if the task is not a built-in one or has no such file.
+    The result contains no settings if the task is not a built-in one or has no such file.
     """
     file = resources.files("evolve") / "config" / "tasks" / f"{task}.toml"
     known = isinstance(task, str) and task in TASKS
@@ -144,8 +144,8 @@ def read_assignment(text: str) -> Source:
     The value is parsed as TOML. A value that is not valid TOML, such as a word without quotation marks, is text.
 
     Raises:
-        ConfigError: the text has another form or contains several settings, or its value has too many digits or nested
-            brackets.
+        ConfigError: the text has another form or contains several settings. It is also an error if the value has too
+            many digits, or brackets that are nested too deeply.
     """
     key, equals, value = (part.strip() for part in text.partition("="))
     parts = key.split(".")

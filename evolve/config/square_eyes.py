@@ -23,8 +23,8 @@ def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
     are not square, the source is returned unchanged.
 
     A task or a preset may be written for eyes with one row of receptors. If a user selects square eyes, the task's
-    default settings of the two genes are removed. If a preset sets only the width, this becomes its setting of
-    `resolution`.
+    default settings of the two genes are removed. If a preset has settings of `resolution_width` only, these become
+    settings of `resolution`.
     """
     genes = source.tree.get("genome", {})
     if eye.square and not source.name:

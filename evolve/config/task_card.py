@@ -49,7 +49,7 @@ class TaskCard:
 
     name: name of the task in directories and tables
     title: name of the task in headings
-    aim: end of the sentence "Eyes and brains evolved ..."
+    aim: purpose of the eyes and brains in this task, as the end of the sentence "Eyes and brains evolved ..."
     settings: settings that this task has and some other tasks do not have
     genes: genes that this task has and some other tasks do not have
     grey: True if all surfaces of its world reflect all wavelengths equally; None: unknown

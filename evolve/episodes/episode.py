@@ -34,31 +34,33 @@ class Pictures:
 class Episode:
     """Recording of one episode in mode "evaluation" or "test". In the shapes of arrays, t is the time step.
 
-    Row t of the arrays contains the signals at time t, the action that followed, the reward for this action, and
-    entries of the observation after it other than the signals.
+    Row t of the arrays contains the signals at time t, the action that followed, and the reward for this action. Row t
+    of the arrays in `beside` belongs to the observation after this action.
 
     task, candidate_id, seed: name of the task, id of the candidate, and seed of the episode
     phenotype, eye, world: the animal, and the settings of its eyes and of the world
-    mode: "evaluation", or "test" if the episode takes place in the layouts of the test set
+    mode: "evaluation", or "test" if the world has a layout that neither training nor selection uses
     commands: meaning of each element of an action
     action: in [-1, 1], (t, number)
     reward: reward of each action, (t,)
     reward_terms: terms of the reward by name, (t,) each; 0 in steps in which the task did not return the term
-    counted: titles by name of a reward term. Reports show how often each of these terms is not 0, in a table row with
-        this title (see `sim.BatchTask`)
-    beside: entries of the observation after each action other than signals and action, by name, (t, number) each, such
-        as "contact" or "feels" (proprioception)
+    counted: for each term of the reward that reports count, the title of its table row, by name of the term. The row
+        shows in how many actions the term was not 0 (see `sim.BatchTask`)
+    beside: what the animal observes after each action besides signals and its last action, such as "contact" or "feels"
+        (an animal's sense of its own body), by name, (t, number) each
     seconds: duration of one action [s]
-    solved: True if the episode counts as solved
+    solved: True if the task judges the episode as solved (see `sim.BatchTask.solved`)
     failure: message of the failure that ended the episode; None without a failure
-    signals: receptor signals with noise, (t, eye, channel, height, width), without the outputs of motion detectors
+    signals: receptor signals with noise, (t, eye, channel, height, width). The outputs of motion detectors, which the
+        animal may also observe, are not included
     perfect_signals: signals of the same receptors behind a perfect lens, without noise, in the same shape; for compound
         eyes, signals of the ommatidia without noise
     wavelengths_nm: wavelengths of the radiance's bands, (band,)
     radiance_frames: time steps at which radiance was recorded, (frame,)
     radiance: radiance of the scene in front of each eye, on a finer grid, (frame, eye, band, y, x), in units of
         `sim.scene.lights`
-    azimuths [rad], elevations_deg: viewing direction of each eye in the frame of its body, site or camera, (eye,)
+    azimuths [rad], elevations_deg: viewing direction of each eye relative to the body, site or camera
+        that carries the eye, (eye,)
     scene: shapes and poses of bodies, and poses of eyes
     position (t, 2) [m], heading (t,) [rad]: pose of the animal on the ground before each action
     plan: plan of the world from above; None if the task has none
@@ -106,7 +108,10 @@ class Episode:
 
     @property
     def eyes(self) -> sim.Eyes:
-        """Design of the animal's eyes. `azimuths` and `scene` contain their directions and poses."""
+        """Design of the animal's eyes.
+
+        `azimuths` and `elevations_deg` contain the directions of the eyes, and `scene` contains their poses.
+        """
         return self.phenotype.eyes(self.eye)
 
     @property

@@ -1,4 +1,4 @@
-"""Storage of episodes in npz archives. Files of the older format can be read, too.
+"""Storage of episodes in npz archives. Files in the format of earlier versions can be read, too.
 
 Nothing in a file is executed when it is loaded.
 """
@@ -108,10 +108,10 @@ def _of_second_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
 
 
 def _of_first_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
-    """Return an episode that was stored in the older format.
+    """Return an episode that was stored in the format of earlier versions.
 
-    The older format was only used for built-in tasks, and does not contain the scene. The world is therefore built
-    again.
+    Only episodes of built-in tasks were stored in this format. Their files do not contain the scene, so the world is
+    built again to obtain it.
     """
     if "course" not in rest.setdefault("world", {}):
         rest["task"] = task_then(rest["task"])

@@ -168,9 +168,9 @@ class Recorder:
     ) -> dict[str, Any]:
         """Return, by name, the fields of an episode that are rendered behind a perfect lens.
 
-        These are the signals of the animal's receptors, and the radiance on a finer grid than that of the receptors,
-        both in the scenes and the light of the episode. Ommatidia have no counterpart behind a perfect lens. For
-        compound eyes, the signals are therefore those of the ommatidia without noise.
+        The fields are the signals of the animal's receptors, and the radiance on a finer grid than that of the
+        receptors. They are rendered for the scenes and the light of the episode. Ommatidia have no counterpart behind a
+        perfect lens. For compound eyes, the signals are therefore those of the ommatidia without noise.
         """
         own = self.phenotype.eyes(self.config.eye)
         perfect = own.with_perfect_lens()

@@ -26,10 +26,10 @@ class Track:
     """Track of an animal during one episode. In the shapes of arrays, t is the time step.
 
     position: position before each action [m], (t, 2)
-    objects: positions of the ground plan's objects before each action [m], (t, object, 2)
+    objects: positions of the objects in `plan` before each action [m], (t, object, 2)
     total: return of the episode
     solved: True if the episode counts as solved
-    plan: plan of the layout in which the episode takes place; None if the task has none
+    plan: ground plan of the world, with walls, goal region and objects; None if the task has no ground plan
     """
 
     position: np.ndarray
@@ -82,8 +82,8 @@ class _Watcher:
     """Recorder of the positions of the animal and of objects while episodes are played.
 
     worlds: environments in which the episodes are played
-    mount: place of the animal's first eye; the recorder takes the position of the body, site or camera that carries
-        this eye as the animal's position
+    mount: place of the animal's first eye on a body, site or camera of the model; the position of this body, site or
+        camera is recorded as the animal's position
     """
 
     def __init__(self, worlds: EyesVecEnv, mount: Mount) -> None:

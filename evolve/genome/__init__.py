@@ -3,11 +3,11 @@
 genes         GENES: quantities that evolution can change
 genotype      Genotype: encoding of gene values in a genome
 phenotype     Phenotype: eyes and brain of an animal; develop: the phenotype of a genome
-phenotype_on_record  checks of a phenotype that was read from a file
+phenotype_on_record  validation of a phenotype that was read from a file
 eye_config    EyeConfig: settings shared by all eyes of a run
-anatomy       space constraints of eyes and receptors
-head_surface  space constraints of compound eyes
+anatomy       repair of gene values for which eyes or receptors would overlap
+head_surface  repair of gene values for which facets do not fit on the head
 relief_genes  genes of a pupil's relief
 interval      Interval: valid range of a value
-plain_values  checks of values that were read from a file
+plain_values  validation of values that were read from a file
 """

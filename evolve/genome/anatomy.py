@@ -3,9 +3,11 @@
 Camera eyes sit on the equator of a head of radius `eye.head_radius`, and an eye is as wide as its retina. The angle
 between neighbouring eyes is placement range / (eyes - 1). All retinas are `eye.sensor_width` wide and filled with
 receptors, which are at least `eye.receptor_width` wide. If `eye.receptor_pitch` is above 0, the width of a retina is
-instead the number of receptors along its width times this pitch. Height takes no space on the head, but receptors are
-also at least `eye.receptor_width` high. The repair changes genes as little as possible. Costs (`evolve.config.costs`)
-are computed for the repaired animal. For compound eyes, see `evolve.genome.head_surface`.
+instead the number of receptors along its width times this pitch. The height of an eye is not limited by the head, but
+receptors are also at least `eye.receptor_width` high. The repair changes genes as little as possible. Costs
+(`evolve.config.costs`) are computed for the repaired animal. For compound eyes, see `evolve.genome.head_surface`.
+
+The argument `sizes` of all functions contains the settings shared by all eyes of a run.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ SLACK = 1e-9  # tolerance for rounding errors: eyes in contact must not count as
 def retina_width(receptors: float, sizes: EyeConfig) -> float:
     """Return the width [m] of a retina with this number of receptors along its width. The eye has the same width.
 
-    sizes: settings of the eyes; the other functions of this module have the same argument
+    sizes: settings shared by all eyes of a run
     """
     return receptors * sizes.receptor_pitch if sizes.receptor_pitch > 0 else sizes.sensor_width
 
@@ -61,7 +63,7 @@ def receptor_side(resolution: tuple[float, float], fov_deg: float, vertical: flo
 def sides(values: Values) -> tuple[int, int]:
     """Return the numbers of receptors along the height and along the width of an eye.
 
-    values: value of each gene, by name
+    values: value of each gene of the animal, by name
     """
     height, width = (SIDE, SIDE) if SIDE in values else SIDES
     return int(values[height]), int(values[width])
@@ -71,11 +73,11 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     """Return the gene values after the repair of overlaps.
 
     If receptors are too narrow, their number along the width is reduced. `_with_high_receptors` repairs receptors that
-    are not high enough. If eyes overlap, they are spread over a larger part of the head. If the searched range of their
-    placement is too small for this, the number of eyes is reduced. If the width of an eye depends on the number of its
-    receptors, this number is then reduced as well, in about the same proportion as the number of eyes. Rhabdoms become
-    at most as wide as the shorter side of a receptor, but at least as wide as the lowest valid value of their gene. All
-    other genes stay within their searched ranges.
+    are not high enough. If eyes overlap, they are spread over a larger part of the head. If they overlap even on the
+    largest part of the head that the search allows, the number of eyes is reduced. If the width of an eye depends on
+    the number of its receptors, this number is then reduced as well, in about the same proportion as the number of
+    eyes. Rhabdoms become at most as wide as the shorter side of a receptor, but their width is never below the lowest
+    valid value of its gene. All other genes stay within their searched ranges.
 
     For compound eyes, see `evolve.genome.head_surface`.
 
@@ -103,10 +105,11 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
 def _with_high_receptors(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     """Return changed gene values, by name. They make receptors at least `eye.receptor_width` high.
 
-    If necessary, the number of rows is reduced. If the lowest number does not fit and the vertical field of view is a
-    gene, this field grows, at most to its highest value. If that is not enough, the horizontal field of view shrinks.
-    The width of the retina [m] stays the same, so its height [m] grows in relation to the narrower field. For square
-    receptors, the result is {}.
+    If necessary, the number of rows is reduced. If even the lowest number of rows does not fit on the retina and the
+    vertical field of view is a gene, this field grows, at most to its highest value. If that is not enough, the
+    horizontal field of view shrinks. The retina keeps its width [m], so that a degree then takes more of it, and the
+    retina becomes higher [m]. If the settings make all receptors square, the result is {}, because receptors that are
+    wide enough are then also high enough.
     """
     vertical = vertical_fov(values, sizes)
     if vertical is None:
@@ -124,7 +127,7 @@ def _with_high_receptors(values: Values, uses: Uses, sizes: EyeConfig) -> Values
 
 @dataclass(frozen=True)
 class _RowsThatFit:
-    """Test of whether rows of receptors, each at least `eye.receptor_width` high, fit on a retina.
+    """Test of whether a number of rows fits on a retina if receptors are at least `eye.receptor_width` high.
 
     columns: number of receptors along the width
     square: True if the number of columns equals the number of rows; `columns` is then ignored
@@ -136,7 +139,7 @@ class _RowsThatFit:
     sizes: EyeConfig
 
     def _least_ratio(self, rows: float) -> float:
-        """Return the smallest height of a retina with this number of rows, divided by its width."""
+        """Return the smallest ratio of height to width [m/m] of a retina on which this number of rows fits."""
         width = retina_width(rows if self.square else self.columns, self.sizes)
         return rows * self.sizes.receptor_width / width
 
@@ -159,7 +162,7 @@ def _degrees(tangent: float) -> float:
 
 
 def _thinned(wanted: Pair, least: Pair, range_deg: float, sizes: EyeConfig) -> Pair:
-    """Return the closest numbers to `wanted` for which eyes do not overlap: eyes, and receptors along an eye's width.
+    """Return numbers of eyes, and of receptors along an eye's width: those closest to `wanted` without overlap of eyes.
 
     This function is part of the repair of animals whose eyes would overlap: it reduces their numbers of eyes and of
     receptors. The distance from `wanted` is the sum of two squared logarithms: of the ratio of the two numbers of eyes,

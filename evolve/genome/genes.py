@@ -95,7 +95,7 @@ class Gene:
     cluster: "morphological", "optical", "neural" or "spectral"
     kind: "real" or "integer"
     range: valid values, the same in all runs
-    default: settings of the gene in runs whose configuration does not mention the gene
+    default: settings (search range, start value, ...) of the gene if the configuration of a run does not mention it
     unit: unit of the values; "" for a number without a unit
     meaning: description for tables and messages
     """
@@ -124,7 +124,7 @@ class Gene:
         return min(use.low + float(np.floor(u * (use.high - use.low + 1))), use.high)
 
     def encode(self, value: float, use: GeneConfig) -> float:
-        """Return the coordinate at which `decode` returns a value; for an integer, the middle of all such coordinates.
+        """Return a coordinate that `decode` maps to the value; for integer genes, the middle of these coordinates.
 
         use: settings of the gene in a run; real values from `use.low` to `use.high` have coordinates from 0 to 1
 
@@ -161,12 +161,12 @@ def gene_table(
     optional: frozenset[str] = frozenset(),
     pupils: bool = True,
 ) -> Mapping[str, Gene]:
-    """Return the genes of animals with these kinds of eyes by name, in the order of the genome.
+    """Return, by name and in genome order, the genes of animals whose eyes have the properties described below.
 
     relief_points: number of points of the relief along one side; without symmetry, there are relief_points² genes
-    relief_symmetric: True if the relief is symmetric: genes determine an eighth of its area, and symmetry the rest
+    relief_symmetric: True if the relief is symmetric, so that the genes of an eighth of its area determine all of it
     square: True if eyes are square and have one gene for both sides
-    optional: names of the genes in OPTIONAL that the animals have
+    optional: names of those optional genes (`OPTIONAL`) that the animals have
     pupils: True if eyes have a pupil with a relief, and not facets
     """
     relief = set(representatives(relief_points, relief_symmetric)) if pupils else set()
@@ -271,7 +271,7 @@ def _gene(
 
 
 def _frozen(gene: Gene) -> Gene:
-    """Return a copy of the gene that the search does not vary, unless the settings of a run open the gene."""
+    """Return the gene with another default: the search varies it only if the settings of a run say so."""
     return replace(gene, default=replace(gene.default, open=False))
 
 
@@ -281,16 +281,16 @@ ALL_GENES: Mapping[str, Gene] = _all_genes(int(RELIEF_POINTS.high))  # genes of 
 
 @lru_cache(maxsize=1024)
 def group_members(name: str) -> tuple[str, ...]:
-    """Return the names of the genes in a group: a cluster, such as "optical", or a family, "doe" or "lambda_max".
+    """Return the names of the genes in a group, which is a cluster, such as "optical", or a family, such as "doe".
 
-    The result is (name,) for the name of a single gene, and () for an unknown name.
+    The families are "doe" and "lambda_max". The result is (name,) for the name of a gene, and () for an unknown name.
     """
     return tuple(gene for gene in ALL_GENES if name in (gene, *groups_of(gene)))
 
 
 @lru_cache(maxsize=1024)
 def groups_of(name: str) -> tuple[str, ...]:
-    """Return a gene's family ("doe" or "lambda_max"), if any, and cluster, such as "optical"; () if it is unknown."""
+    """Return a gene's family, "doe" or "lambda_max", if it has one, and its cluster; () if the name is unknown."""
     if name not in ALL_GENES:
         return ()
     families = tuple(family for family in FAMILIES if name.startswith(f"{family}_"))

@@ -19,8 +19,8 @@ __all__ = ["CLUSTERS", "GENES", "Gene", "GeneConfig", "Genotype", "group_members
 class Genotype:
     """Encoding of gene values in one run: the genes that the search varies (open genes), their order and ranges.
 
-    The search may vary an open gene only from a later generation on (`opens_at`). A genome of an earlier generation
-    also has a number for this gene, which encodes its start value.
+    The search may begin to vary an open gene in a later generation (`opens_at`). Genomes of the generations before it
+    also have a number for this gene, which encodes its start value.
 
     uses: settings of each gene of the animals, by name: open or frozen, search range, start value
     """

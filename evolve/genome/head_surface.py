@@ -54,9 +54,10 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
 
 
 def contradiction(uses: Uses, sizes: EyeConfig) -> tuple[str, tuple[str, ...]] | None:
-    """Return None if `fitted` can repair every genome, so that eyes are not too high and facets fit on the head.
+    """Return None if the repair by `fitted` is possible for every genome.
 
-    Otherwise return an error message and the names of the settings that contradict each other.
+    After the repair, eyes are at most 180° high in Mercator's projection, and their facets fit on the head. If the
+    repair can fail, return an error message and the names of the settings that contradict each other.
     """
     eyes, rows, columns = (lowest(name, uses) for name in COUNTS)
     width, area = lowest(DIAMETER, uses), sizes.facet_area
@@ -78,5 +79,5 @@ def contradiction(uses: Uses, sizes: EyeConfig) -> tuple[str, tuple[str, ...]] |
 
 
 def _height(rows: float | np.ndarray, columns: float | np.ndarray, fov_deg: float) -> float | np.ndarray:
-    """Return the height of an eye in Mercator's projection [degrees]."""
+    """Return the height [degrees] of an eye's field of view, measured in Mercator's projection."""
     return rows * HEXAGON * fov_deg / columns

@@ -238,8 +238,8 @@ class Phenotype:
 def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
     """Return the phenotype that develops from a genome in a run with these settings.
 
-    If eyes would overlap each other, or receptors each other, gene values are changed as little as possible (repaired).
-    Every genome with the right number of finite coordinates has a phenotype.
+    If eyes or receptors would overlap, a repair changes the gene values as little as possible to prevent this. Every
+    genome with the right number of finite coordinates therefore has a phenotype.
 
     genome: coordinate of each gene that the search varies, (gene,); coordinates are clipped to [0, 1]
     config: settings of the run, such as a `RunConfig`

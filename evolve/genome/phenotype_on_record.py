@@ -1,6 +1,7 @@
-"""Checks of a phenotype that was read from a file: the type of each field, and the range of its gene.
+"""Checks of a phenotype that was read from a file.
 
-Some fields determine the sizes of an animal's arrays. All fields are therefore checked before the animal is built.
+Each field must have the right type, and a value in the valid range of the gene that determines the field. Some fields
+determine the sizes of an animal's arrays. All fields are therefore checked before the animal is built.
 """
 
 from __future__ import annotations

@@ -228,11 +228,11 @@ class OpenedRun(Run):
         out: Path | str | None = None,
         mode: str = "evaluation",
     ) -> list[Path]:
-        """Play an episode of a candidate, and write a page that shows it, like `evolve replay`. Return all paths.
+        """Play an episode of a candidate, and write a page of it, like `evolve replay`. Return the paths of all files.
 
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episode
-        every: actions from one image of the scene to the next in a Rerun recording; requires "rrd" in `also`; None: 8
+        every: a Rerun recording has one image of the scene per `every` actions; requires "rrd" in `also`; None: 8
         also: formats of additional files next to the page: "rrd" (a recording for Rerun), "gif" and "mp4"
         out: path of the page; None: a name in the run directory
         mode: "evaluation", or "test" for the layouts of the test set
@@ -263,8 +263,8 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: an argument is invalid, or the run was opened without the "FILE.py:CLASS" of its user task, or
-                the task's code cannot be executed.
+            ConfigError: an argument is invalid, the run has a user task but was opened without its "FILE.py:CLASS", or
+                the code of the user task cannot be executed.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
             RuntimeError: a method of the user task fails at the start of the episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.

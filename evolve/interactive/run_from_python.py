@@ -43,8 +43,8 @@ def run(
         Values are numbers, texts, True or False. None: no such settings
     config: path of a TOML file with settings, which override those of the preset; None: no file
     scale: scale of a preset that has several, "laptop" or "paper"; None: "laptop". Presets without scales require None
-    start_from: "RUN:ID" of an animal of another run, or "RUN" for its best animal, whose genes are the start values;
-        None: the start values in the settings
+    start_from: animal whose genes are the start values: "RUN:ID" for the animal ID of another run, or "RUN" for the
+        best animal of that run; None: the start values in the settings
     out: run directory; None: runs/TASK-PRESET-N, with the first free number N
     callbacks: functions that are called as callback(run, candidate) after every evaluation of a candidate; an exception
         ends the run
@@ -131,7 +131,7 @@ def _check(**given: Any) -> None:
 def _toml(value: Any) -> str:
     """Return the value of a setting as TOML text, as in the option `--set`.
 
-    The text is written as JSON, because JSON and TOML write finite numbers, most texts, true and false in the same way.
+    The text is written as JSON. JSON and TOML write true, false, finite numbers and most texts in the same way.
     NumPy values are converted to Python values.
 
     Raises:

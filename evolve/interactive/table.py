@@ -36,8 +36,9 @@ def candidate_table(candidates: Sequence[Candidate]) -> pd.DataFrame:
 def drift_table(drift: Drift) -> pd.DataFrame:
     """Return a table that compares a run with searches whose fitness is random. Each row is a quantity, such as a gene.
 
-    Column `run` is the quantity's mean in the run's last generations. `median` is the median of its means in the
-    searches, and 95 % of these means lie between `low` and `high`. `p` is the p-value of `run`.
+    Column `run` is the quantity's mean in the run's last generations. The quantity has such a mean in each search, too:
+    `median` is the median of the searches' means, and 95 % of them lie between `low` and `high`. `p` is the p-value of
+    `run`.
     """
     import pandas as pd
 

@@ -1,7 +1,7 @@
-"""Adam on a single vector of all weights. A step therefore needs only a few operations, not a few for each tensor.
+"""The optimizer Adam on a single vector, in which all tensors of weights are joined.
 
-torch.optim would need ten times the number of calls. Its first use also imports torch's compiler, which takes
-seconds in every worker process.
+A step needs a few operations on this vector, instead of a few operations on each tensor. torch.optim would need ten
+times as many operations. Its first use also imports torch's compiler, which takes seconds in every worker process.
 """
 
 from __future__ import annotations

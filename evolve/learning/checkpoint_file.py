@@ -46,9 +46,9 @@ def metadata_of(content: bytes) -> dict[str, str]:
 
 
 def owned(owner: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, str]:
-    """Return a checkpoint's metadata: its owner, its numbers, and a placeholder, which `sealed` replaces by a checksum.
+    """Return the metadata of a checkpoint: `owner`, `numbers`, and a placeholder that `sealed` replaces by a checksum.
 
-    owner: training run from which the checkpoint comes, see `TrainingRung.owners`
+    owner: description of the training run to which the checkpoint belongs, see `TrainingRung.owners`
     numbers: contents of the checkpoint that are not tensors, by name
     """
     return {ENTRY: json.dumps({**numbers, "owner": owner, "sha256": BLANK})}

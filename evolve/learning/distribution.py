@@ -1,4 +1,7 @@
-"""Normal distribution of a policy's actions. Gradients never move its mean further beyond the bounds of actions."""
+"""Normal distribution of a policy's actions.
+
+If the mean of the distribution is outside the bounds of actions, gradients that would move it further out are set to 0.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from torch import Tensor, nn
 
 
 class Within(torch.autograd.Function):
-    """Identity function on the means of actions. Its gradient never moves a mean further beyond the bounds -1 and 1.
+    """Identity function on the means of actions. Gradients that would move a mean further out of [-1, 1] become 0.
 
     Actions beyond the bounds are clipped. If the mean is far outside, all actions are clipped to the same value.
     Exploration then has no effect, and no gradient would move the mean back. The remedy is "zeroing gradients"

@@ -122,7 +122,10 @@ class EyeFeatures(BaseFeaturesExtractor):
         return torch.cat([features, *(known[name] for name in self.beside)], dim=1)
 
     def _less_mean(self, observation: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """Return the entries that a policy normalises, in normalised form, by name; {} if there are none."""
+        """Return, by name, normalised values of those entries of the observation that a policy normalises.
+
+        If there are no such entries, the result is {}.
+        """
         if self.felt is None:
             return {}
         joined = self.felt(torch.cat([observation[name] for name in self.normalised], dim=-1))
@@ -131,8 +134,9 @@ class EyeFeatures(BaseFeaturesExtractor):
     def _encode(self, frames: Tensor) -> Tensor:
         """Return codes (eye, code, a, b) of frames (a, b, eye, channel, height, width).
 
-        The axes a and b are those of the stored frames, such as sample and memory. For compound eyes, frames have the
-        axes (a, b, ommatidium, channel), and `eye` has the length 1.
+        A code is the encoder's output for a frame of one eye. The axes (a, b) of the frames are (sample, place in
+        memory) or (frame, segment). For compound eyes, frames have the axes (a, b, ommatidium, channel), and the axis
+        eye of the result has the length 1.
         """
         a, b = frames.shape[:2]
         return self.encoder(self._signals(frames)).unflatten(2, (a, b))

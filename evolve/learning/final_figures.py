@@ -19,7 +19,7 @@ __all__ = ["UnfitPolicy", "final_episodes", "require_fit", "require_test_set"]
 
 
 class UnfitPolicy(ValueError):
-    """The signals of an animal's eyes do not have the shape for which the policy that should control it was trained."""
+    """A policy was trained for eyes whose signals have another shape than those of the animal it should control."""
 
 
 def final_episodes(
@@ -51,7 +51,7 @@ def final_episodes(
 
 
 def require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
-    """Check that the signals of the eyes have the same shape in these worlds as in the policy's training.
+    """Check that the signals of the animal's eyes in `worlds` have the shape for which the policy was trained.
 
     Raises:
         UnfitPolicy: the shape differs.
@@ -62,12 +62,13 @@ def require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
 
 
 def require_test_set(config: RunConfig) -> None:
-    """Check that the mode "test" has other worlds than the evaluation.
+    """Check that the run has a test set: in the mode "test", episodes have other layouts than in the evaluation.
 
-    User tasks pass the check, because they may define such a mode.
+    All user tasks pass the check, because they may define other layouts for this mode.
 
     Raises:
-        ConfigError: the task has no family of layouts, or the layouts of the run are fixed.
+        ConfigError: the task does not have the setting `world.layouts`, or its value is not "family", which gives each
+            mode its own set of layouts.
     """
     if config.card.has_file or config.world.layouts == FAMILY:
         return

@@ -43,8 +43,8 @@ def evaluate(
     seed: seed of the policy's initial weights, of all worlds and of all random numbers in learning
     policy_path: path of the trained policy (safetensors), which is not written if learning diverged
     progress: function that is called with (steps trained, steps planned) after every rollout; None: no function
-    rung: part of the training run at whose end training stops (`evolve.search.successive_halving`); training continues
-        from the latest usable checkpoint that an earlier rung has written; None: train to the end
+    rung: one of the parts of a training run (`evolve.search.successive_halving`); training stops at the end of this
+        part, and continues from the latest usable checkpoint of an earlier part; None: train to the end
 
     Warns:
         CheckpointWarning: a checkpoint cannot be used.

@@ -121,7 +121,9 @@ def _in_order(directions: np.ndarray, near: np.ndarray) -> np.ndarray:
 
 
 def directions_from_record(stored: Mapping[str, Any]) -> tuple[tuple[float, ...], ...]:
-    """Return the directions in the record of a policy; () for eyes without ommatidia.
+    """Return the viewing directions of ommatidia for which a policy was trained; () for eyes without ommatidia.
+
+    stored: record of the policy's shape, see `PolicyConfig.record`
 
     Raises:
         ValueError: the directions do not fit the shape of the eyes, or are not unit vectors.

@@ -78,9 +78,11 @@ def entries_of(space: spaces.Dict) -> tuple[Entry, ...]:
 
 
 def entries_from_record(stored: Mapping[str, Any]) -> tuple[Entry, ...]:
-    """Return the entries in the record of a policy, other than the eyes' signals and the previous action.
+    """Return a policy's entries of the observation other than the eyes' signals and the previous action.
 
     Older versions stored only the size of the proprioception, or, for built-in tasks, nothing.
+
+    stored: record of the policy's shape, see `PolicyConfig.record`
 
     Raises:
         TypeError: a stored entry is not a list.

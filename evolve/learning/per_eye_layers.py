@@ -1,8 +1,8 @@
-"""Linear layers for each eye: a plain layer, a layer that normalises its inputs, and a layer on several frames.
+"""Linear layers for each eye: a plain layer, a layer that normalises its inputs, and a layer that combines frames.
 
-The last axis of the inputs x contains the samples. A layer W x is then one batched matrix product (GEMM) without a
-copy. With samples on the first axis, the product x Wᵀ took three times as long, both forward and backward, because
-layers have few outputs.
+The last axis of the inputs x is that of the samples in a batch. A layer W x is then one batched matrix product (GEMM)
+without a copy. With samples on the first axis, the product x Wᵀ took three times as long, both forward and backward,
+because layers have few outputs.
 """
 
 from __future__ import annotations
@@ -111,9 +111,11 @@ class MemoryLinear(PerEyeLinear):
 
 
 class _Slide(torch.autograd.Function):
-    """Sum of the terms W[lag] codes[lag : lag + steps] over all lags, with weights W, and the gradient of this sum.
+    """Sum of W[lag] codes[lag : lag + steps] over lag = 0, ..., memory - 1, and the gradient of this sum.
 
-    Each term is a matrix product (GEMM) on the stored codes. A version that copied the last frames for each step took
+    A code is the encoder's output for a frame of one eye. At each step, the agent remembers the codes of the last
+    frames, and W[lag] are the weights of the code in place `lag`, from the oldest to the newest. Each term is a matrix
+    product (GEMM) on the stored codes. A version that copied the remembered codes of each step into a new array took
     four times as long, both forward and backward.
     """
 
@@ -121,8 +123,9 @@ class _Slide(torch.autograd.Function):
     def forward(ctx: Any, codes: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
         """Return the sum of the weighted codes plus `bias`, (eye, output, sample).
 
-        codes: outputs of the encoder (codes) for the frames of each segment, a sequence of steps of one world, (eye,
-            element of the code, frame, segment)
+        A segment is a sequence of steps of one world. The samples are the pairs (step, segment).
+
+        codes: outputs of the encoder for the frames of all segments, (eye, element of the code, frame, segment)
         weight: weights, (eye, output, element of the code, lag)
         bias: biases, (eye, output, 1)
         """
@@ -146,8 +149,9 @@ class _Slide(torch.autograd.Function):
 
 
 def _slices(codes: Tensor, memory: int) -> list[Tensor]:
-    """Return, for each place in memory from the oldest frame to the newest, the codes of the frames at this place.
+    """Return the codes of the oldest remembered frame of all steps, those of the second oldest, etc. up to the newest.
 
+    A code is the encoder's output for a frame of one eye. At each step, the agent remembers the last `memory` frames.
     Each element of the list is a view without a copy, (eye, element of the code, sample). The samples are the pairs
     (step, segment) in row-major order, where a segment is a sequence of steps of one world.
 

@@ -109,8 +109,8 @@ class PolicyConfig:
         """Return the fields by name as JSON values.
 
         The record of a run contains a hash of each policy file. All versions of rhabdom must therefore write the same
-        bytes for a policy. Older versions lacked `wiring` and `beside` (observations other than the eyes' signals and
-        the previous action). Policies that these versions could describe are still written without these fields.
+        bytes for a policy. Older versions lacked the fields `wiring` and `beside`. Policies that these versions could
+        describe are still written without these two fields.
         """
         left_out = {"beside"} | ({"wiring"} if self.wiring == DIRECT else set())
         left_out |= set() if self.directions else {"directions"}

@@ -213,8 +213,8 @@ def train(
 
     After every `eval_interval` steps (rounded up to whole rollouts) and at the end, the policy plays one episode in
     each of the evaluation worlds. Training ends after `patience` evaluations without a better mean return, or after
-    `total_steps`. The result is the policy at the evaluation with the highest mean return; if several evaluations share
-    it, at the earliest.
+    `total_steps`. The result is the policy at the evaluation with the highest mean return, or at the first of several
+    such evaluations.
 
     seed: seed of initial weights, exploration and mini-batches, and of the evaluation worlds
     progress: function that is called with (steps trained, steps planned) after every rollout; None: training is not

@@ -1,6 +1,6 @@
 """Change of the grid of an eye's signals before they reach the encoder, the part of the brain that processes images.
 
-Signals are averaged on a coarser grid, and the averages are repeated on a finer grid. Both serve as
+Signals are averaged on a coarser grid, and the averages are repeated on a finer grid. Averaging and repetition serve as
 controls in experiments on resolution. An eye of 15 x 15 receptors whose signals are averaged on 4 x 4 cells and
 repeated on 15 x 15 has the acuity of 4 x 4 receptors, but still 15 x 15 inputs.
 """

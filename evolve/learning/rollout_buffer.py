@@ -3,8 +3,8 @@
 The observations of an agent with memory are stacks of the last frames. The buffer of stable-baselines3 (SB3) stores
 these stacks, and thus `memory` copies of each frame, and PPO encodes every copy. For 64 worlds x 64 steps of 2 x 15 x
 15 receptors with 3 channels and 10 frames, this takes 221 MB. In this buffer, a mini-batch consists of segments. A
-segment is a sequence of consecutive steps of one world, whose stacks share most of their frames. Each frame of a
-segment is encoded once.
+segment is a sequence of consecutive steps of one world. The stacks of these steps share most of their frames. Each
+frame of a segment is encoded once.
 """
 
 from __future__ import annotations
@@ -27,10 +27,11 @@ SEGMENT_STEPS = 8
 
 
 class FrameRolloutBuffer(RolloutBuffer):
-    """Rollout buffer that yields each frame once instead of in several stacks, for `evolve.learning.eye_features`.
+    """Rollout buffer that passes each frame on once, although several steps of an agent with memory observe it.
 
-    An agent with memory observes a stack of its last frames. At the start of an episode, there are too few frames for
-    a stack. `EyeFeatures` then adds copies of the episode's first frame, as the environments do.
+    An agent with memory observes a stack of its last frames. `evolve.learning.eye_features.EyeFeatures` needs only the
+    frames. At the start of an episode, there are too few frames for a stack. `EyeFeatures` then adds copies of the
+    episode's first frame, as the environments do.
     """
 
     observation_space: spaces.Dict
@@ -47,7 +48,10 @@ class FrameRolloutBuffer(RolloutBuffer):
         self.beside = {name: np.zeros((worlds, steps, size), np.float32) for name, size in sizes.items()}
 
     def compute_returns_and_advantage(self, last_values: Tensor, dones: np.ndarray) -> None:
-        """Compute returns and advantages without NumPy's warnings of overflow, because the learner checks the loss."""
+        """Compute returns and advantages without NumPy's warnings of overflow.
+
+        The warnings are not needed, because the learner raises an error if the loss is not finite.
+        """
         with np.errstate(over="ignore", invalid="ignore"):
             super().compute_returns_and_advantage(last_values, dones)
 

@@ -43,7 +43,7 @@ def schedule(config: LearningConfig, steps: int) -> tuple[int, float]:
 
 
 def mean_passes(config: LearningConfig, begin: int, end: int) -> float:
-    """Return the mean number of passes over the samples of an update, between the steps `begin` and `end`.
+    """Return the mean number of passes over the samples in an update, for all updates from step `begin` to step `end`.
 
     Without an update between these steps, the result is the number of passes in the next update.
     """

@@ -23,17 +23,17 @@ __all__ = ["executed_task"]
 
 @lru_cache(maxsize=4)
 def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | BatchTask:
-    """Execute the code of a user task, and return the task. Later changes of the file have no effect.
+    """Execute the code of a user task, and return the task. Later changes of the task's file have no effect.
 
     encoded_textures: True to treat colour textures as display colours, except textures for which the model requests
         linear light. False: MuJoCo's compiler decides which textures contain linear light
 
     Raises:
-        ConfigError: the code cannot be executed, the class does not derive from `sim.Task` or `sim.BatchTask` or
-            requires arguments, its model cannot be compiled, or one of its settings is invalid. With
-            `encoded_textures=False`, it is also an error if the task's model is already compiled and has textures that
-            the compiler decided to treat as linear. The message is one line; it names file and line of an error
-            in the user's code.
+        ConfigError: the code cannot be executed, the task's class does not derive from `sim.Task` or `sim.BatchTask`,
+            its constructor requires arguments, the task's model cannot be compiled, or a task setting is invalid.
+            With `encoded_textures=False`, it is also an error if the task's model is already compiled and has textures
+            that the compiler decided to treat as linear. The message is one line; it names file and line of an error in
+            the user's code.
     """
     module = _executed(code)
     cls = getattr(module, code.name, None)

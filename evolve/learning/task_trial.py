@@ -42,8 +42,9 @@ def check_settings(config: RunConfig) -> None:
     empty. Existing runs are not checked, so they can always be continued and replayed.
 
     Warns:
-        UnusedSettingWarning: the task defines `eye` or `fidelity`, but the run's genome or settings determine them. Or
-            it defines `auxiliary` (additional signals of receptors, such as depth), which evolving eyes do not have.
+        UnusedSettingWarning: the task defines `eye` or `fidelity`, but the run's genome or settings determine them. A
+            task that defines `auxiliary` (additional signals of receptors, such as depth) also causes this warning,
+            because evolving eyes have no additional signals.
 
     Raises:
         ConfigError: the task has several mounts and does not define `place`, its module cannot be executed, or the user
@@ -106,7 +107,7 @@ def try_task(config: RunConfig) -> None:
 
     Raises:
         ConfigError: the task's module, model, eyes or methods fail, or the user has not named the task's file, for
-            example by `--task`, so that its code must not be executed. The message is one line.
+            example by `--task`. Code that the user has not named is never executed. The message is one line.
     """
     if config.choice.named_code is None:
         return

@@ -31,13 +31,14 @@ class TrainingEnvs:
 
 
 def worlds_of(phenotype: Phenotype, config: RunConfig, learning: int, evaluation: int) -> TrainingEnvs:
-    """Return the environments of an animal.
+    """Return the environments in which an animal is trained, its best policy is selected and its fitness is measured.
 
     learning: seed of the environments for training
     evaluation: seed of the environments for selection and fitness
 
     Raises:
-        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ConfigError: the run was opened without naming its user task (argument `task`), or the task's module cannot be
+            executed.
         ValueError: the eyes cannot be placed in the user task; see `evolve.learning.animal_task.with_phenotype`.
     """
     memory, settings, episodes = phenotype.memory_frames, config.learning, config.evaluation.episodes

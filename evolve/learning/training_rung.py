@@ -33,7 +33,7 @@ class TrainingRung:
 
     @property
     def number(self) -> int:
-        """Number of this rung, counted from 0; it is the value `rung` in a record."""
+        """Number of this rung (part of a training run), counted from 0; a candidate's record stores it as `rung`."""
         return len(self.ends) - 1
 
     def owners(self, phenotype: Phenotype, config: RunConfig, seed: int) -> tuple[dict[str, Any], ...]:
@@ -54,9 +54,10 @@ class TrainingRung:
         return tuple({**common, "rung": number, "ends": list(self.ends[: number + 1])} for number in numbers)
 
     def set_aside_unusable(self, phenotype: Phenotype, config: RunConfig, seed: int) -> None:
-        """Rename unusable checkpoints of earlier rungs; see `set_aside`.
+        """Rename unusable checkpoints of earlier rungs (parts of the training run); see `set_aside`.
 
-        Checkpoints are checked from the latest earlier rung backwards, until one is usable. It keeps its name.
+        Checkpoints are checked from the latest earlier rung backwards, until one is usable. The usable
+        checkpoint keeps its name.
 
         Raises:
             OSError: a checkpoint is not a regular file, or cannot be renamed.

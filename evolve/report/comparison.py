@@ -75,7 +75,7 @@ def comparison_lines(runs: Sequence[Run]) -> list[str]:
 
 
 def write_page(runs: Sequence[Run], path: Path) -> None:
-    """Write an HTML page with the comparison: a figure of the best fitness over the generations, and a table.
+    """Write an HTML page that compares runs: a figure of the best fitness over the generations, and a table.
 
     The file is written completely or not at all.
 

@@ -38,7 +38,8 @@ def export_run(
 
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
-        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ConfigError: the run was opened without naming its user task (argument `task`), or the task's module cannot be
+            executed.
         ValueError: `every` is not a whole number from 1 to 1,000,000, or `seed` is negative.
         RuntimeError: a method of the user task fails at the start of the episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.

@@ -233,15 +233,15 @@ def _mtf(light: WhiteLight) -> Html:
 
 
 def diffraction_limit(light: WhiteLight, frequency: np.ndarray) -> np.ndarray:
-    """Return the MTF of a circular pupil without aberrations in white daylight, (frequency,).
+    """Return the MTF of a circular pupil without aberrations in white daylight.
 
-    The pupil is as wide as that of the eye.
+    The pupil is as wide as that of `light.eye`. The result is an array (frequency,).
 
     In each band, the MTF is (2/π)(arccos s - s √(1 - s²)) for s < 1, else 0, where s is the frequency divided by the
     cutoff frequency (Goodman, Fourier Optics, §6.3.3). The bands are weighted by daylight and by the mean sensitivity
-    of the eye's channels.
+    of this eye's channels.
 
-    frequency: spatial frequencies on the retina [1/m]
+    frequency: spatial frequencies on the retina [1/m], (frequency,)
     """
     weights = light.eye.spectral_bands.weights.mean(axis=0) * daylight(light.psf.wavelengths)
     s = np.clip(frequency / light.psf.cutoff[:, None], 0, 1)

@@ -145,7 +145,7 @@ def _links(axes: Axes, candidates: Sequence[Candidate], place: Callable[[Candida
 
 
 def vision_figure(name: str, label: str, generations: Sequence[int], values: Sequence[float]) -> Html:
-    """Draw one measure of the best eye so far over the generations.
+    """Draw how a measure of image quality changes over the generations, for the best eye found so far.
 
     name: name of the measure, for ids and for screen readers
     label: label of the vertical axis
@@ -249,7 +249,7 @@ def _trajectory(axes: Axes, path: Trajectory, marker_size: float = 3) -> None:
 
 
 def _spread(axes: Axes, x: Generations, low: ArrayLike, median: ArrayLike, high: ArrayLike) -> None:
-    """Draw the median of each population, and a band between its 10 % and 90 % quantiles.
+    """Draw the median of a quantity in each generation, and a band between its 10 % and 90 % quantiles.
 
     A single generation has a bar instead, because a band would have no width.
     """

@@ -1,4 +1,4 @@
-"""Section of the report on fitness.
+"""Fitness section of a run's report.
 
 It shows fitness, its parts and the success rate over the generations, the learning curves, and the family tree.
 """

@@ -1,8 +1,8 @@
-"""Test for selection: comparison of final gene values between runs and searches with random fitness.
+"""Test for selection: final gene values of runs are compared with those of searches whose fitness is random.
 
-If the values in the runs are within the range of these searches, the genes may have changed by chance (drift). If the
-runs have costs, the searches subtract them from a random task fitness (`evolve.search.null_model`). The test then
-shows selection by the task, and not by the costs.
+If the values of the runs are within the range of the values of the random searches, the genes may have changed by
+chance (drift). If eyes and brain have costs in the runs, the random searches subtract the same costs from a random task
+fitness (`evolve.search.null_model`). The test then shows selection by the task, and not by the costs.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Drift:
         return "task fitness minus costs" if self.costs else "fitness"
 
     def as_plain_values(self) -> dict[str, Any]:
-        """Return, as JSON values, how the runs compare with searches that have random fitness."""
+        """Return this comparison of runs with searches whose fitness is random, as JSON values."""
         first, last = self.generations[0], self.generations[-1]
         moved = [asdict(one) for one in self.moved]
         return {"generations": [first, last], "searches": self.searches, "random": self.random, "moved": moved}
@@ -111,13 +111,14 @@ class Drift:
 
 
 def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[float], None] = lambda _: None) -> Drift:
-    """Compare runs, which may differ only in seeds and numbers of workers, with searches with random fitness.
+    """Compare the animals of runs with the animals of searches whose fitness is random (`evolve.search.null_model`).
 
-    The quantities are the genes that the search varies, the horizontal acuity [cycles/degree], the vertical acuity
-    unless `eye.vertical_fov` is "receptors", and the number of receptor positions in all eyes. Quantities that do not
-    vary between the searches, or that a run lacks, are omitted. Means are over the last 3 generations that all runs
-    have completed, or over fewer if a gene began to vary in the last 2 of them. The searches are those of
-    `evolve.search.null_model`.
+    The runs may differ only in seeds and numbers of workers. The compared quantities are the genes that the search
+    varies, the horizontal and vertical acuity [cycles/degree], and the number of receptor positions in all eyes. The
+    vertical acuity is omitted if the setting `eye.vertical_fov` is "receptors". Quantities that do not vary between the
+    searches, or that at least one run lacks, are omitted as well. The value of a quantity is its mean over the last 3
+    generations that all runs have completed. If a gene began to vary in the second or third of these generations, the
+    mean is only over the generations from then on.
 
     searches: number of searches
     done: function that is called with the completed fraction of the searches
@@ -185,7 +186,7 @@ def _open(name: str, config: RunConfig) -> bool:
 
 
 def _ends(run: Run, generations: range) -> dict[str, float]:
-    """Return the mean of each quantity over the successful candidates of these generations.
+    """Return the mean of each quantity that `drift_of` compares over the successful candidates of these generations.
 
     The mean is NaN for a quantity that no candidate has.
     """

@@ -47,7 +47,8 @@ class Html:
     Other modules, except `svg`, must create nonempty pieces only with functions of this module, such as `html`.
 
     markup: the HTML text
-    rules: CSS declarations for elements of this piece, by the value of the elements' attribute `data-look`
+    rules: CSS declarations for elements of this piece; a key is the value of the attribute `data-look` of those
+        elements to which the declarations apply
     """
 
     markup: str = ""
@@ -130,7 +131,10 @@ def duration(seconds: float) -> str:
 
 
 def exact(value: float) -> str:
-    """Return a number as text, with at most six significant digits: a setting, or an integer below a million."""
+    """Return a number as text, with at most six significant digits.
+
+    They suffice for settings, and for integers below a million.
+    """
     return f"{value:g}".replace("-", "−")
 
 

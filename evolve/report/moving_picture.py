@@ -102,7 +102,7 @@ def _frames(episode: Episode, stride: int) -> Iterator[Image.Image]:
 
 
 def _palette(samples: list[Image.Image]) -> Image.Image:
-    """Return the palette of the GIF: the colours of the drawing, and representative colours of sample frames.
+    """Return the palette of a GIF: colours of ground plan and background, and representative colours of sample frames.
 
     The representative colours are selected by median cut.
     """
@@ -115,9 +115,10 @@ def _palette(samples: list[Image.Image]) -> Image.Image:
 
 
 def _world(episode: Episode, time: int) -> Image.Image:
-    """Return an image of the world at one time: the latest rendered image, and the ground plan in its corner, if any.
+    """Return an image of the world at one time: the latest rendered image, with the ground plan in its corner.
 
-    The plan is at the lower left. Without rendered images, it fills the image. Without both, the image has the width 0.
+    The plan, if there is one, is at the lower left. Without rendered images, it fills the image. Without
+    both, the image has the width 0.
     """
     pictures, above = episode.pictures, None if episode.plan is None else _from_above(episode, episode.plan, time)
     if pictures is None:
@@ -133,7 +134,7 @@ def _world(episode: Episode, time: int) -> Image.Image:
 def _from_above(episode: Episode, plan: GroundPlan, time: int) -> Image.Image:
     """Return an image of the world from above, drawn from its ground plan.
 
-    The image is as high as a frame of the moving picture, 320 pixels.
+    The image is as high as a frame of the GIF or video, 320 pixels.
 
     time: number of the time step in the episode
     """
@@ -146,9 +147,11 @@ def _from_above(episode: Episode, plan: GroundPlan, time: int) -> Image.Image:
 
 
 def _frame(world: Image.Image, seen: np.ndarray, aspect: float) -> Image.Image:
-    """Return one frame: the world on the left, and an image of each eye's signals on the right, arranged in rows.
+    """Return one frame: the world on the left, and an image of each eye's signals on the right.
 
-    world: image of the world
+    The images of the eyes are arranged in rows.
+
+    world: image of the world at the time of the frame
     seen: signals of the eyes as pixels, (eye, y, x, 3)
     aspect: width of a field of view divided by its height
     """

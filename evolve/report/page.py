@@ -78,7 +78,10 @@ def animals_section(run: Run) -> Html:
 
 
 def numbers_section(run: Run) -> Html:
-    """Return the section with the main results. If there is a test set of layouts, the best candidate plays in it.
+    """Return the section with the main results.
+
+    If the run has a test set (layouts of walls that neither training nor evaluation has used), the best candidate plays
+    episodes in these layouts.
 
     Raises:
         RunError: the policy of the best candidate is missing or damaged.
@@ -235,7 +238,7 @@ def _makers(run: Run, episode: Episode | None) -> Iterator[tuple[str, Callable[[
 
 
 def _within(doing: Doing, done: int, of: int, what: str, share: float) -> None:
-    """Report progress within a section as a fraction of the whole page.
+    """Report progress within one section of a report as a fraction of the whole report.
 
     done: number of completed sections
     of: number of all sections

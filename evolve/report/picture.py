@@ -52,9 +52,11 @@ def data_uri(pixels: NDArray[np.uint8]) -> str:
 
 
 def film_sheet(frames: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int]:
-    """Return a sheet (y, x, 3) that contains all frames (time, eye, y, x, 3), and the number of frames in each row.
+    """Return two values: a sheet that contains all frames, and the number of frames in each row of the sheet.
 
-    A frame contains all eyes side by side. The frames fill the sheet row by row.
+    A frame contains all eyes side by side. The frames fill the sheet row by row. The sheet is an array (y, x, 3).
+
+    frames: pixels of the frames, (time, eye, y, x, 3)
     """
     time, eyes, height, width, _ = frames.shape
     columns = max(1, min(time, SHEET_WIDTH // (eyes * width)))

@@ -204,8 +204,8 @@ def _film_of_world(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
 def _commands(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
     """Return the commands at the time steps that the player shows.
 
-    If the commands are speed [m/s] and turn [°], they are returned by name, because player.js writes them as a
-    sentence. Otherwise, the actions are returned as plain numbers.
+    If the commands are speed [m/s] and turn [°], the result contains them by name, and player.js shows each with its
+    unit. Otherwise, the result contains the actions as plain numbers.
     """
     action = episode.action[kept]
     found = {
@@ -228,9 +228,9 @@ def _kept(episode: Episode) -> np.ndarray:
 
 
 def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
-    """Return (frame, "goal" or "adversary") for each time at which one of these was reached, in order of the frames.
+    """Return (frame, "goal" or "adversary") for each time at which the animal reached one, sorted by frame.
 
-    A frame is an index in `kept`. It is the first that is shown at or after the event.
+    The frame is an index in `kept`, of the first shown time step that is not earlier than this event.
 
     kept: time steps that the player shows
     """

@@ -37,7 +37,7 @@ def write_replay(
     every: number of actions between two images of the scene in a recording for Rerun; None: 8
     also: formats of additional files next to the page: "rrd" (a recording for Rerun), "gif" and "mp4"
     out: path of the page; None: a name in the run directory
-    mode: "evaluation", or "test" for the test set, layouts that neither training nor evaluation has used
+    mode: "evaluation", or "test" for an episode in layouts that neither training nor evaluation has used (the test set)
 
     Raises:
         RunError: the candidate does not exist, no candidate has succeeded, or the policy is missing or damaged.
@@ -70,7 +70,7 @@ def _require_page(out: Path) -> None:
     """Check the path of the page. The check precedes the episode, because playing an episode takes time.
 
     Raises:
-        ConfigError: the path ends in .rrd, .gif or .mp4, as the files next to the page do.
+        ConfigError: the path ends in .rrd, .gif or .mp4, the endings of files other than the page.
         StrangeFileError: the path is a link, FIFO, device or directory.
     """
     require_file_name(out)

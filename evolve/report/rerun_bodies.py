@@ -44,7 +44,11 @@ def draw_goal_region(to: RerunStream, plan: GroundPlan) -> None:
 
 
 def _place(to: RerunStream, entity: tuple[str, ...], positions: np.ndarray, rotations: np.ndarray) -> None:
-    """Log the positions (t, 3) [m] and rotation matrices (t, 3, 3) of an entity before each action."""
+    """Log the position and orientation that an entity has before each action.
+
+    positions: positions [m], (action, 3)
+    rotations: rotation matrices, (action, 3, 3)
+    """
     to.columns(entity, len(positions), to.rr.Transform3D.columns(translation=positions, mat3x3=rotations))
 
 

@@ -50,13 +50,13 @@ class RerunStream:
         self.stream.log(list(entity), *what, static=True)
 
     def log(self, t: int, entity: tuple[str, ...], what: Any) -> None:
-        """Log data of an entity before action t."""
+        """Log data that describe an entity at the time before action t."""
         self.stream.set_time("action", sequence=t)
         self.stream.set_time("time", duration=t * self.seconds)
         self.stream.log(list(entity), what)
 
     def columns(self, entity: tuple[str, ...], n: int, columns: Any) -> None:
-        """Log the states of an entity before each of n actions.
+        """Log the states that an entity has before each of n actions.
 
         columns: one state for each action, in the format that `rerun.send_columns` takes
         """

@@ -107,7 +107,8 @@ def best_genes(run: Run, best: Candidate) -> Html:
 def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str | Html]:
     """Return a row of the table of genes.
 
-    The row describes one gene, or several genes that are the heights in one row of the grid of a lens's relief.
+    The row describes one gene or several. Several genes are heights of a lens's relief, which lie side by side in the
+    pupil.
     """
     genes, uses = [ALL_GENES[name] for name in names], [run.config.genome[name] for name in names]
     name, meaning = names[0], genes[0].meaning
@@ -175,7 +176,10 @@ def _acuities(animal: Phenotype) -> str:
 
 
 def _directions(candidates: Sequence[Candidate]) -> str:
-    """Return ", horizontal × vertical", for a heading, if these two acuities of any candidate differ, else ""."""
+    """Return the end of a heading: ", horizontal × vertical" or "".
+
+    It is "" if the horizontal and the vertical acuity of each candidate are equal.
+    """
     differ = any(len(set(_both_acuities(candidate.phenotype))) > 1 for candidate in candidates)
     return ", horizontal × vertical" if differ else ""
 

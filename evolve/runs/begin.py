@@ -32,7 +32,7 @@ class RunRequest:
     preset: name of the preset
     config: TOML file, whose settings override the preset; None: no file
     assignments: single settings, "KEY=VALUE", which override all others
-    scale: scale of a preset that has several, see `assemble`; None: "laptop"
+    scale: size of the run, "laptop" or "paper", if the preset has both; None: "laptop" for such a preset
     start_from: "RUN:ID", an animal of another run, whose genes become the start values; None: no animal
     """
 
@@ -49,8 +49,8 @@ class PreparedRun:
     """Checked settings of a run, which is ready to start. Nothing has been written yet.
 
     config: settings of the run
-    preset: name of the preset, without the name of the task if the preset ends with it; a part of the name of the run
-        directory
+    preset: name of the preset, for the name of the run directory; if the preset's name ends with "-" and the name of
+        the task, this ending is removed
     origin: "RUN:ID", the animal whose genes are the start values; None without such an animal
     """
 
@@ -87,9 +87,9 @@ class PreparedRun:
 def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
     """Collect the settings of a run, and check that the run can start on this machine. Nothing is written.
 
-    tried: True to build the search, draw random layouts and try the user task in this process. False if the run is
-        only planned. Other processes then try the task and measure the speed of training. The search is then built
-        only if its optimizer is neither "CMA" nor "mutation"
+    tried: True to build the search, draw random layouts and try the user task in this process. False for a plan
+        of a run, for which other processes try the task and measure the speed of training; this process then builds
+        the search only for optimizers other than "CMA" and "mutation"
 
     Raises:
         ConfigError: a setting is invalid, the optimizer is unknown, random layouts cannot be drawn or two of them are
@@ -112,9 +112,10 @@ def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
 
 
 def check_task(config: RunConfig) -> list[Warning | str]:
-    """Check the layouts and the user task of a run, try the task, and return the warnings of this package.
+    """Check the layouts and the user task of a run, including a few actions in it, and return the warnings.
 
-    A warning that is issued several times is returned once.
+    Only warnings that are defined in `optics`, `sim` or `evolve` are returned. A warning that is issued several times
+    is returned once.
 
     A worker process calls this function while a run is planned; see `evolve.cli.pace`.
 

@@ -39,10 +39,10 @@ def carry_on(
 ) -> None:
     """Evaluate all candidates that are missing in the record of a run. The caller must hold the lock of the run.
 
-    After an exception, the record is intact, and the run can be resumed.
+    If this function raises an exception, the record remains valid, and the run can be resumed.
 
-    watched: function that takes the run and the number of workers, and returns a watcher; it is called after the
-        executor has started
+    watched: function that takes the run and the number of workers, and returns a watcher, which shows the progress;
+        this function is called after the executor has started
     workers: function that takes the settings of the run, and returns an executor
 
     Raises:

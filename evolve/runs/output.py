@@ -1,7 +1,7 @@
 """Safe output of text on a terminal.
 
-All text that commands print passes a `Voice`, a stream that escapes control characters. Commands print results with
-`say`.
+All text that commands print is written through a `Voice`, a stream that escapes control characters. Commands print
+results with `say`.
 
 Messages, settings and names of directories may come from an untrusted source. Escape sequences in them are printed as
 visible text, so that they have no effect on the terminal. Characters that the terminal's encoding lacks are spelt out
@@ -71,8 +71,8 @@ class Voice(OwnedStream):
     stream: the stream that receives the text
     patient: True to continue without output after an error of `stream`, such as a full disk; False to raise the error
     obeyed: True to write control characters unchanged, which a progress bar needs
-    name: name of the stream in the error or, if `patient` is True, in a note on stderr; None: errors other than a
-        closed pipe or terminal are ignored
+    name: name of the stream, for the message of the error or, if `patient` is True, of a note on stderr. None: an
+        error is ignored, unless the pipe or terminal has been closed
 
     Raises:
         BrokenPipeError: on writing, the pipe or terminal has been closed, and `patient` is False.

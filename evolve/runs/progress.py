@@ -86,7 +86,7 @@ class Tally:
 
     @property
     def median(self) -> float | None:
-        """Median fitness of the latest generation; None if no candidate of it has succeeded."""
+        """Median fitness of the latest generation; None if no candidate in this generation has succeeded."""
         if not self._run.candidates:
             return None
         latest = self._run.generation(max(candidate.generation for candidate in self._run.candidates))
@@ -113,7 +113,7 @@ class Tally:
         return ", ".join(parts)
 
     def closing(self) -> str:
-        """Return the duration, the pace and the utilisation of the workers as text, for the end of a run."""
+        """Return a text for the end of a run: duration, training steps per second, and utilisation of the workers."""
         return (
             f"{clock(self.seconds)} at {self.steps_per_second:,.0f} steps/s; "
             f"the {self._workers} workers were busy {self.utilisation:.0%} of the time"
@@ -250,7 +250,7 @@ def watcher(run: Run, out: TextIO = sys.stderr, workers: int = 1, as_json: bool 
     """Return the watcher for an output: Events if `as_json` is True, else Bar on a terminal, and Lines elsewhere.
 
     out: stream for the output
-    workers: number of workers, needed for the share of time in which they were busy
+    workers: number of workers, from which the fraction of time in which workers were busy is computed
     """
     if as_json:
         return Events(run, out, workers)

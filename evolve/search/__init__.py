@@ -5,7 +5,7 @@ loop                main loop of a run, from proposals to recorded candidates
 search              Search: proposals of candidates and their seeds; genes may begin to vary in later generations
 optimizers          CMA-ES and other optimizers
 null_model          searches with random fitness, for comparison with runs
-same_search         check that a rebuilt search proposes the candidates on record
+same_search         check that a search, rebuilt to continue a run, proposes the recorded candidates
 successive_halving  selection of the candidates that continue after a rung (a part of training)
 job                 Job: a candidate for an executor to evaluate
 local_executor      executor with processes on this machine

@@ -1,6 +1,6 @@
 """Connection to a Dask scheduler.
 
-No call waits longer than `patience_s` for a sign of life of the scheduler or of its workers.
+A call fails if the scheduler, or all workers at once, have given no sign of life for `patience_s`.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class Connection:
     topic, events: Dask topic to subscribe to, and the function that receives its events
 
     Raises:
-        ExecutorError: the scheduler does not answer, or Dask is not installed. All methods except `close` raise it
-            after `patience_s` without an answer or a heartbeat.
+        ExecutorError: the scheduler does not answer, or Dask is not installed. All methods except `close` raise an
+            ExecutorError after `patience_s` without an answer of the scheduler, or without a heartbeat of any worker.
         ConfigError: the address of the scheduler requires certificates, but there are none.
     """
 
@@ -109,7 +109,7 @@ class Connection:
 
         call: function that returns an awaitable, which is awaited in the thread of Dask's client
         timeout: maximum duration of the call [s]; by default, it is unlimited while the scheduler answers
-            and a worker sends heartbeats
+            and at least one worker sends heartbeats
 
         Raises:
             ConnectionLost: the connection was lost during the call.
@@ -135,7 +135,7 @@ class Connection:
             answer.cancel()
 
     def remove_lost_workers(self) -> None:
-        """Make the scheduler remove workers that were silent for `patience_s`, and give their candidates to others.
+        """Make the scheduler remove workers that were silent for `patience_s`, and give other workers their candidates.
 
         Raises:
             ConnectionLost: the connection was lost.
@@ -173,7 +173,7 @@ class Connection:
     def _pass_time(self, longest: float) -> None:
         """Count the time since the last check as silence, and notify the user of a long silence or a lost connection.
 
-        longest: maximum time that is counted [s], because this process may have been suspended since the last check
+        longest: maximum time that is counted [s]; if more has passed, this process was suspended, which is not silence
 
         Raises:
             ExecutorError: the silence has lasted for `patience_s`.

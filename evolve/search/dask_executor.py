@@ -52,8 +52,8 @@ class DaskExecutor:
     scheduler: the scheduler, or its address
     function: "module:name" of the function that evaluates a candidate; it takes the arguments of
         `evolve.learning.fitness.evaluate`
-    patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]; an evaluation may take
-        longer, because workers also send heartbeats meanwhile
+    patience_s: maximum time for which the scheduler, or all workers at once, may give no sign of life [s]; an
+        evaluation may take longer, because workers also send heartbeats meanwhile
     note: function that is called with one line if the run waits for a sign of life, or removes a silent worker
     count: number of workers when the context was entered
 
@@ -100,10 +100,11 @@ class DaskExecutor:
         progress: function that is called with (candidate id, steps trained, steps planned); None: no function
 
         Raises:
-            ExecutorError: a worker has other software than this process, cannot use the run's settings, or lacks
-                resources such as disk space, or the scheduler or all workers are silent for `patience_s`.
+            ExecutorError: a worker's software differs from that of this process, or a worker cannot use the run's
+                settings or lacks resources such as disk space. The error is also raised if the scheduler, or all
+                workers at once, have been silent for `patience_s`.
             ConfigError: the run has a user task, and was opened without naming it (argument `task`).
-            OSError: a policy or a checkpoint cannot be read or written here.
+            OSError: this process cannot read or write a policy or a checkpoint.
         """
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
         under_way: dict[Any, _Trial] = {}

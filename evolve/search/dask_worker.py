@@ -60,8 +60,8 @@ class Order:
     topic: Dask topic on which the worker reports its progress
     ends: total number of training steps at the end of each rung, up to the last rung of this job. A rung is a part of
         a training run. () if training is not divided into rungs
-    begun: training continues from the last complete rung, given by its number and the content of its checkpoint file.
-        None: training starts from the beginning
+    begun: number of the last complete rung, and content of its checkpoint file, from which training continues. None:
+        training starts from the beginning
     software: versions of the software on the machine that sends the job
     code: path and text of a user task's file; None for a built-in task
     """
@@ -107,7 +107,7 @@ def evaluate(order: Order) -> Reply:
     Raises:
         UnfitWorker: the worker cannot evaluate candidates, or its software differs from that of the process that sent
             the order.
-        TimeoutError: the scheduler does not send the number of earlier attempts to evaluate this candidate in time.
+        TimeoutError: the scheduler takes too long to send the number of earlier attempts to evaluate this candidate.
     """
     from distributed import Variable, get_worker
 

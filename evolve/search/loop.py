@@ -45,7 +45,7 @@ class Executor(Protocol):
 
 
 class Watcher(Protocol):
-    """Protocol of objects that follow a run."""
+    """Protocol of objects that are informed of the progress of a run."""
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
         """Receive the progress of a candidate's training: `steps` of `planned` steps."""
@@ -145,9 +145,9 @@ def _record(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, watcher
 
 
 def _after(before: Candidate, candidate: Candidate) -> Candidate:
-    """Return a candidate after a rung (a part of its training), with its wall time and episode failures summed.
+    """Return a candidate after a rung (a part of its training), with totals of its wall time and episode failures.
 
-    The sums cover this rung and all earlier rungs. If training failed in this rung, the number of training steps and
+    The totals cover this rung and all earlier rungs. If training failed in this rung, the number of training steps and
     the learning curve are those of the previous rung.
 
     before: the record of the candidate after the previous rung

@@ -6,7 +6,7 @@ evidence of selection only if they lie outside the range of the null model.
 
 Costs also select: with a price per receptor, even random task fitness leads to few receptors. The null model therefore
 subtracts the costs from its random task fitness. If the result of a run lies outside the range of the null model, this
-is evidence that the task selects.
+is evidence of selection by the task itself.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class NullModel:
     counts: Mapping[str, NDArray[np.int64]]
 
     def ends(self, quantity: str, generations: range) -> Floats:
-        """Return the mean of a quantity over all candidates of these generations, (search,).
+        """Return, for each search, the mean of a quantity over all candidates of these generations: array (search,).
 
         Searches in which no candidate has the quantity are omitted.
         """
@@ -121,7 +121,7 @@ def fitness_spread(runs: Sequence[Run], generations: int) -> list[float]:
 def _search(
     config: RunConfig, measure: Measure, generations: int, spread: Sequence[float]
 ) -> dict[str, tuple[list[float], list[int]]]:
-    """Return, for each quantity that `measure` returns, its mean in each generation, and the number of values.
+    """Return, for each quantity that `measure` returns, its mean and the number of its values in each generation.
 
     Candidates for which the value is NaN are not counted. If no candidate has a value, the mean is NaN.
 
@@ -144,7 +144,8 @@ def _proposals(config: RunConfig, generations: int, spread: Sequence[float]) -> 
     Without costs of eyes and brain, the fitness is a standard normal random number. With costs, this number is
     multiplied by the value of `spread` for the generation, and the costs are subtracted from the product.
 
-    With `search.steady_state`, a fitness is reported before each new proposal after the first population, as in a run.
+    With `search.steady_state`, as in a run, the first generation is proposed before any fitness is reported. Before
+    each later proposal, one fitness is reported: that of the oldest proposal whose fitness has not been reported yet.
     """
     search, chance = Search(config), np.random.default_rng(config.seed)
 
@@ -186,7 +187,7 @@ def last_generations(config: RunConfig, generations: int) -> list[range]:
 
 
 def p_value(values: Sequence[float], ends: Floats) -> float:
-    """Return the two-sided p-value of the final values of one or several runs under the null model.
+    """Return the two-sided p-value of a quantity's final values in one or several runs, tested against the null model.
 
     The samples of the null model are searches with random fitness. The value of a single run counts as an additional
     sample (Davison and Hinkley 1997, §4.2). Therefore, p is at least 2 / (searches + 1). For several runs, their mean
@@ -194,7 +195,7 @@ def p_value(values: Sequence[float], ends: Floats) -> float:
     is the number of runs. Here, too, p is at least 2 / (searches + 1).
 
     values: final value of a quantity in each run
-    ends: final values of the quantity in the searches, from `NullModel.ends`, (search,)
+    ends: final values of the quantity in the searches, from `NullModel.ends`: array (search,)
     """
     mean = float(np.mean(values))
     several = np.random.default_rng(0).choice(ends, (SEVERAL, len(values))).mean(axis=1)

@@ -87,10 +87,11 @@ class Scheduler:
     def require_answer(self) -> None:
         """Check, before a run starts, that the scheduler answers.
 
-        If the address begins with tls://, the certificates of this object are used, or those in Dask's own settings.
+        If the address begins with tls://, the certificates of this object are used. If it has none, those in Dask's own
+        settings are used.
 
         Raises:
-            ConfigError: the address begins with tls://, but there are no certificates.
+            ConfigError: the address begins with tls://, but neither this object nor Dask's settings name certificates.
             ExecutorError: the scheduler does not answer within 5 s, or Dask is not installed.
         """
         self.security()
@@ -116,7 +117,7 @@ class Scheduler:
         timeout: maximum time for the connection [s]
 
         Raises:
-            ConfigError: the address requires certificates, but there are none.
+            ConfigError: the address begins with tls://, but neither this object nor Dask's settings name certificates.
             ExecutorError: the scheduler does not answer in time, or Dask is not installed.
         """
         security = self.security()
@@ -158,7 +159,7 @@ class Scheduler:
         """Return Dask's `Security` with the certificates of this object; None if Dask's own settings apply.
 
         Raises:
-            ConfigError: the address requires certificates, but there are none.
+            ConfigError: the address begins with tls://, but neither this object nor Dask's settings name certificates.
             ExecutorError: Dask is not installed.
         """
         try:
@@ -184,7 +185,10 @@ def close(client: Any) -> None:
 
 
 def _silence_dask() -> None:
-    """Suppress log messages of Dask in this process. They have tracebacks; rhabdom itself reports lost connections."""
+    """Suppress log messages of Dask in this process.
+
+    They would show long tracebacks of lost connections, which rhabdom itself reports in one line.
+    """
     for name in ("distributed", "tornado", "asyncio", *logging.root.manager.loggerDict):
         if name.split(".")[0] in ("distributed", "tornado", "asyncio"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)

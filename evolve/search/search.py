@@ -1,9 +1,9 @@
 """The search, which proposes candidates and receives their fitness.
 
-A gene may begin to vary only in a later generation (its setting `opens_at`). A phase begins with a generation in which
-genes begin to vary. It lasts until the next such generation, or to the end of the search. The state of the search
-follows from the settings, the seed and the fitness values received so far. A run is continued by repeating all
-proposals and reporting all recorded fitness values again; no state is stored.
+A gene begins to vary in the generation that its setting `opens_at` gives, which need not be the first one. A phase
+begins with a generation in which genes begin to vary. It lasts until the next such generation, or to the end of the
+search. The state of the search follows from the settings, the seed and the fitness values received so far. A run is
+continued by repeating all proposals and reporting all recorded fitness values again; no state is stored.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Proposal:
     """A proposed genome.
 
     place: id of the candidate, its generation, and its number in this generation
-    genome: coordinates of the genes that vary at any time in the search, in [0, 1]
+    genome: coordinates, in [0, 1], of all genes that vary in at least one generation of the search
     parents: ids of the candidates from which the optimizer derived the genome. When further genes begin to vary, a new
         optimizer starts from the best candidate so far, if there is one. This candidate counts as the parent until the
         new optimizer names parents.
@@ -137,7 +137,9 @@ class Search:
 
 
 def training_seed(run_seed: int, candidate_id: int) -> int:
-    """Return the seed of a candidate's training and evaluation, which follows from the run's seed and the id.
+    """Return the seed for the training and evaluation of a candidate.
+
+    The function computes this seed from the seed of the run and the id of the candidate.
 
     run_seed: the setting `seed` of the run
     """

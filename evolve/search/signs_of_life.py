@@ -1,4 +1,4 @@
-"""Record of the signs of life of a Dask scheduler and its workers, and of the time that has passed without them."""
+"""Record of the signs of life of a Dask scheduler and its workers, and of the time since the last sign of life."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class SignsOfLife:
     _paused: tuple[str, ...] = ()
 
     def wait(self, seconds: float) -> None:
-        """Add time that has passed without an answer of the scheduler."""
+        """Add `seconds`, which passed without an answer of the scheduler, to the time of its silence."""
         self._scheduler_s += seconds
 
     def answer(self, workers: Mapping[str, Mapping[str, Any]]) -> None:
@@ -82,8 +82,8 @@ class SignsOfLife:
     def lost_workers(self) -> tuple[str, ...]:
         """Addresses of workers that have been silent for at least `patience_s`.
 
-        The result is () if every worker that accepts or evaluates candidates is silent, because then `exhausted` is
-        True.
+        The result is () if every worker that accepts or evaluates candidates has been silent for this time. The
+        property `exhausted` reports this case.
         """
         if self._workers_s >= self.patience_s:
             return ()

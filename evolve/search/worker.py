@@ -40,8 +40,8 @@ class Message:
     """Message from a worker to its executor.
 
     kind, content: "progress" with (steps trained, steps planned); "done" with the Evaluation; "unfit" with the reason
-        why the worker cannot evaluate candidates; or "died" with None, which the executor itself creates if
-        the pipe is closed
+        why the worker cannot evaluate candidates; or "died" with None. The executor itself creates the message "died"
+        if the pipe is closed.
     """
 
     kind: Literal["progress", "done", "unfit", "died"]
@@ -103,8 +103,8 @@ def _keep_freed_memory() -> None:
     """Make glibc keep up to 1 GiB of freed memory until the evaluation of a candidate is complete.
 
     By default, glibc requests new pages from the system for each array of about 100 kB or more, and the system fills
-    these pages with zeros. With many eyes, this takes a tenth of the time of an update of the policy. On systems other
-    than Linux, this function does nothing.
+    these pages with zeros. With many eyes, getting new pages takes a tenth of the time of an update of the policy. On
+    systems other than Linux, this function does nothing.
     """
     allocator = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
     if allocator is not None:

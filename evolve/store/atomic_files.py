@@ -16,7 +16,7 @@ POLICIES, TRAININGS = "policies", "trainings"  # folders of a run
 
 
 def sweep(folder: Path) -> None:
-    """Remove the unfinished files that killed processes left in a folder.
+    """Remove unfinished files from a folder. Processes that were killed while writing have left these files.
 
     A file is kept if its name contains the id of another running process, which may still be writing it.
 

@@ -33,7 +33,7 @@ class Candidate:
     seed: seed of training and evaluation
     fitness: task fitness minus costs; -inf if the candidate failed. The search maximises the fitness.
     parents: ids of the candidates from which the search derived the genome; () if there are none
-    rung: part of training, from 0, after which the candidate was evaluated; steps and seconds include earlier rungs
+    rung: number (0, 1, ...) of the part of training before the evaluation; steps and seconds include earlier parts
     policy: SHA-256 of the trained policy's file; None if there is no policy, or if an older version wrote the record
     costs: costs of eyes and brain (`evolve.config.costs`); 0 for a failed candidate
     """
@@ -91,7 +91,8 @@ class Candidate:
     ) -> Candidate:
         """Return a candidate with this place and outcome; values that cannot be stored are changed (see `recordable`).
 
-        A candidate whose fitness is not finite counts as failed. No costs are subtracted yet; see `charged`.
+        The place consists of the candidate's id, its generation, and its number in this generation. A candidate whose
+        fitness is not finite counts as failed. No costs are subtracted from the fitness yet; see `charged`.
 
         Raises:
             ValueError: the place, genome, phenotype, seed or parents cannot be recorded.
@@ -127,7 +128,7 @@ class Candidate:
             return self._failed(failure)._restored()
 
     def _failed(self, failure: str, **kept: Any) -> Candidate:
-        """Return the candidate as failed. Only the fields `kept` of its outcome remain."""
+        """Return the candidate as failed. Its outcome is reset, except the fields given in `kept` as name=value."""
         return replace(self, **{**vars(Evaluation.failed(failure)), **kept}, policy=None, costs=0.0)
 
     def _restored(self) -> Candidate:
@@ -206,7 +207,7 @@ class Candidate:
         return candidate
 
     def _require_success(self) -> None:
-        """Check that a successful candidate has fitness, returns and success rate, and that a failed one has no costs.
+        """Check that a candidate has fitness, returns and success rate, or has failed with no costs subtracted.
 
         Raises:
             ValueError: the candidate does not meet these conditions.
@@ -232,7 +233,7 @@ _COUNTS = {"id": 10**9, "generation": 10**5, "index": 10**4, "seed": 2**64 - 1, 
 def _not_negative(value: Any, name: str) -> float:
     """Return `value` as a float of at least 0.
 
-    `real` with the range [0, 1e300] would accept negative numbers, because its tolerance is proportional to the range.
+    The function `real` is not enough for this check: it tolerates values that are slightly outside a wide range.
 
     Raises:
         ValueError: the value is negative or not a number.
@@ -265,10 +266,9 @@ def _episode_failure(entry: Any) -> tuple[str, int]:
 
 
 def _text(value: Any, name: str) -> str | None:
-    """Return a text or None after a check.
+    """Return a failure message of a record, or None. Invalid characters are escaped, and long messages are shortened.
 
-    A failure message may contain a file name with bytes that are not valid text; they are escaped. Records of older
-    versions may contain messages of any length; long messages are shortened.
+    A message may contain a file name with invalid characters. Older versions recorded messages of any length.
 
     Raises:
         ValueError: the value is neither text nor None.

@@ -43,7 +43,7 @@ class Chain:
         """Return the state of the checksums after one more line. The line may end with a line feed.
 
         Raises:
-            ValueError: the checksum of the line does not match, or is missing although earlier lines have checksums.
+            ValueError: the checksum of the line does not match, or is missing although an earlier line has one.
         """
         body, checksum = _split(line.removesuffix(b"\n"))
         due = self._next(body)

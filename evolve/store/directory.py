@@ -4,7 +4,7 @@ config.toml        every setting
 versions.json      versions of the software at each start of the run
 candidates.jsonl   the record: one line for each evaluation of a candidate, in order of completion
 policies/          trained policies
-trainings/         checkpoints of training runs that may continue with their next part (rung)
+trainings/         checkpoints after parts (rungs) of training, from which the next part can start
 lock               file that the process working on the run has locked
 """
 
@@ -55,9 +55,9 @@ class Run:
 
     @classmethod
     def create(cls, path: Path | str, config: RunConfig, origin: str | None = None) -> Self:
-        """Create a run in a directory that is missing or empty, or has only files of a process killed in this function.
+        """Create a run in a directory that is missing, empty, or has only files that an interrupted `create` left.
 
-        origin: "RUN:ID", the animal whose genes are the start values; None if there is no such animal
+        origin: "RUN:ID", the animal whose genes the search starts from; None if it does not start from an animal
 
         Raises:
             RunError: the directory contains other files, or cannot be written.
@@ -178,8 +178,9 @@ class Run:
         """Append a candidate to the record, and synchronise the file with the disk.
 
         Raises:
-            RunError: the record contains the candidate already, its line could not be read back, another process has
-                changed the record, or the record cannot be written. Earlier lines remain intact.
+            RunError: the record contains the candidate already, the candidate has a value that would make its line
+                unreadable, another process has changed the record, or the record cannot be written. Earlier lines
+                remain intact.
         """
         if self._lock is not None and not self._lock.stands:
             raise RunError(f"{self.record.path}: was changed by another process; nothing is added")
@@ -190,7 +191,7 @@ class Run:
         return self.path / POLICIES / f"{candidate_id:06d}.safetensors"
 
     def checkpoint_path(self, candidate_id: int, rung: int) -> Path:
-        """Return the path of a candidate's checkpoint at the end of a rung. The file need not exist."""
+        """Return the path of a candidate's checkpoint after a rung (part of its training). The file need not exist."""
         return self.path / TRAININGS / f"{candidate_id:06d}-{rung}.safetensors"
 
     def forget_trainings(self, candidate_ids: Iterable[int]) -> None:
@@ -201,7 +202,7 @@ class Run:
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """Evaluated candidates in the order of their ids, each as recorded after the last rung that it has reached."""
+        """Evaluated candidates by id, each as recorded after the last rung (part of training) that it has completed."""
         return self.record.candidates
 
     @property
@@ -248,7 +249,7 @@ class Run:
 
     @property
     def in_order_of_finish(self) -> list[Candidate]:
-        """Candidates in the order of the record; a candidate occurs once for each rung that it has completed."""
+        """Candidates in order of evaluation; each occurs once for each rung (part of training) it has completed."""
         return list(self.record.lines.values())
 
     def on_record(self, candidate_id: int, rung: int) -> Candidate | None:
@@ -263,7 +264,7 @@ class Run:
         return steps
 
     def evaluated_at(self, rung: int) -> set[int]:
-        """Return the ids of all candidates that have been evaluated after a rung."""
+        """Return the ids of all candidates that have been evaluated after a rung (part of their training)."""
         return {candidate_id for candidate_id, reached in self.record.lines if reached == rung}
 
 

@@ -37,8 +37,9 @@ class Record:
     """The lines of a record on disk.
 
     path: the file candidates.jsonl
-    lines: candidates by (id, rung), in the order of the file
-    candidates: candidates in the order of their ids, each as recorded after the last rung that it has reached
+    lines: dict from (id of the candidate, rung) to the candidate on this line, in the order of the file. A rung is a
+        part of training, after which the candidate is evaluated
+    candidates: candidates in the order of their ids, each as recorded after the last rung that it has completed
     notice: message about ignored lines; None if there are none. Ignored lines are an unfinished last line, for example
         after a power failure, or a damaged line and all lines after it
     before_damage: True if only the lines before the first damaged line are used; otherwise, damage is an error
@@ -120,8 +121,9 @@ class Record:
         """Append a candidate, and synchronise the file with the disk.
 
         Raises:
-            RunError: the record contains the candidate already, its line could not be read back, another process has
-                changed the record, or the record cannot be written. Earlier lines remain intact.
+            RunError: the record contains the candidate already, the candidate has a value that would make its line
+                unreadable, another process has changed the record, or the record cannot be written. Earlier lines
+                remain intact.
         """
         if (candidate.id, candidate.rung) in self.lines:
             raise RunError(f"{self.path.parent}: candidate {candidate.id} has been evaluated already")
@@ -202,7 +204,7 @@ def _furthest(lines: Lines) -> tuple[Candidate, ...]:
 def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate, ...]:
     """Return the candidates of a run's record, in the order of ids, after `new` has been appended to the record.
 
-    A record has a line for each rung of training that a candidate has reached. The line of the last rung counts.
+    A record has a line for each rung (part of training) that a candidate has completed. The last of them counts.
     `_furthest` would return the same candidates, but would read all lines again.
 
     candidates: result of `_furthest` before `new` is appended

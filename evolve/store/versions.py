@@ -50,8 +50,8 @@ PACKAGES = (
 def present() -> dict[str, str]:
     """Return the software versions, architecture and device that influence a run's numbers, by name.
 
-    The names are "python", "machine" (architecture), "commit" (of rhabdom; "" if unknown), "device", and PACKAGES. The
-    version of a missing package is "not installed".
+    The names are "python", "machine" (architecture), "commit" (of rhabdom; "" if unknown), "device", and the names of
+    ten Python packages, such as "numpy". The version of a missing package is "not installed".
     """
     versions = {"python": platform.python_version(), "machine": platform.machine(), "commit": _commit()}
     versions["device"] = device()
@@ -64,16 +64,19 @@ def present() -> dict[str, str]:
 
 
 def recorded(run: Path) -> dict[str, str]:
-    """Return the versions of the software, by name as in `present`, at the first start of a run.
+    """Return the versions of the software at the first start of a run, by name.
 
-    The result is {} if versions.json is missing or damaged.
+    The names are those that the function `present` uses. The result is {} if versions.json is missing or damaged.
     """
     starts = _starts(run)
     return starts[0]["versions"] if starts else {}
 
 
 def commits(run: Path) -> list[str]:
-    """Return the commits of rhabdom that started or resumed a run, as far as known, in order and each once."""
+    """Return the git commits of rhabdom's code that started or resumed a run, in order and each once.
+
+    Starts without a recorded commit are omitted.
+    """
     known = [start["versions"].get("commit") for start in _starts(run)]
     return list(dict.fromkeys(commit for commit in known if commit))
 

@@ -1,7 +1,7 @@
 """Camera eyes of vertebrates and a spider. Each eye has only a patch of retina; `goldfish_lens` returns a lens alone.
 
 The receptors of an `optics.Eye` form a square lattice. The distance between receptors is chosen so that the finest
-grating that the lattice resolves is the finest that the source reports, either for the animal or for its retina.
+grating that the lattice resolves is the finest that the animal or its retina resolves according to the cited article.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def mouse(receptors_across: int = 40, pupil_diameter: float = 1e-3) -> Eye:
 
 
 def eagle(receptors_across: int = 60) -> Eye:
-    """Return the deep fovea of a wedge-tailed eagle, *Aquila audax*.
+    """Return an eye with a square patch of the deep fovea of a wedge-tailed eagle, *Aquila audax*.
 
     Source: Reymond, Vision Research 25, 1477, 1985 (abstract): the retina resolves 140 cycles/degree, and the optics
     resolve 157 at the smallest pupil. A pupil with this cutoff at 550 nm is 4.9 mm wide. No source was consulted for
@@ -120,8 +120,8 @@ def goldfish(receptors_across: int = 40, radius: float = 1.4e-3) -> Eye:
     """Return a patch of a goldfish's retina behind a ball lens, with an acuity of 60/26 = 2.3 cycles/degree.
 
     Source: Northmore & Dvorak, Vision Research 19, 255, 1979: 13 minutes of arc per half period, in agreement with the
-    separation of cones. The retina is concentric with the lens, so the patch represents any direction. The pupil has
-    0.9 times the diameter of the lens. See `goldfish_lens`.
+    separation of cones. The retina is concentric with the lens, so a patch in any direction of view would have the
+    same image quality. The pupil has 0.9 times the diameter of the lens. See `goldfish_lens`.
 
     receptors_across: receptors along each side of the patch, 1 to 1000.
     radius: radius [m] of the lens.

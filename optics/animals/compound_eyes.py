@@ -63,7 +63,10 @@ def _guide(diameter: float, length: float, proximal: float | None = None) -> Wav
 
 
 def _by_angle(diameter: float, focal_length: float, angle_deg: float, length: float) -> Facet:
-    """Return a facet whose rhabdom subtends `angle_deg` in the visual field: its diameter is focal length · angle."""
+    """Return a facet whose rhabdom subtends `angle_deg` in the visual field.
+
+    The diameter of the rhabdom is focal length · angle. The argument `diameter` is that of the facet.
+    """
     return Facet(diameter, focal_length, focal_length * math.radians(angle_deg), length)
 
 

@@ -7,9 +7,9 @@ polygonal      Polygon, Slit
 shapes         Disk, Oblong, Spider: parts of combined openings
 bitmap         Bitmap: openings drawn as images
 combined       union, difference, intersection; hexagonal segments
-boundary       edge of a combined opening
-pixelated      any shape, divided into pixels
-outline        edges and their crossings with lines
+boundary       computes the edge of a combined opening
+pixelated      quadrature over an opening that is divided into pixels
+outline        edge of an opening, and its crossings with lines
 strips         quadrature over the area inside an outline
 soft_edge      kernel that softens an edge
 curved_disk    converging and diverging waves behind disks and rings with a soft edge

@@ -168,7 +168,7 @@ class Aperture(ABC):
         return self._softened(SoftEdge.cheapest(passband, ripple, widest_reach, self.half_widths))
 
     def with_edge(self, passband: float, stopband: float, ripple: float) -> SoftAperture:
-        """Return the aperture after a low-pass filter that falls between two frequencies [cycles per pupil radius].
+        """Return the aperture after a low-pass filter with a given transition band [cycles per pupil radius].
 
         Frequencies below `passband` stay unchanged and those above `stopband` vanish, to within `ripple`. The method
         `soften` is given no stopband: it chooses the one that needs the fewest samples.

@@ -23,8 +23,8 @@ MOST_EDGES = 4000  # choice: an outline of this many straight edges takes about 
 class Bitmap(ReadOnlyArrays):
     """A shape made of the open pixels of a square image: `union(Bitmap(image))` is the aperture.
 
-    The pixels fill the square [-1, 1]² in pupil radii, and their edges are exact. `union` closes all parts outside the
-    pupil's circle.
+    The pixels fill the square [-1, 1]² in pupil radii, and their edges are exact. `union` cuts the shape off at the
+    pupil's circle, so pixels are closed where they lie outside the circle.
 
     image: array (y, x) of n x n pixels, 1 or True in open pixels, 0 or False in closed ones. y ascends with the row.
 

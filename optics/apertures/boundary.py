@@ -37,8 +37,8 @@ class Boundary:
     """The edge of an opening, in pieces: straight segments and circular arcs.
 
     segments: (n, 2, 2), straight pieces, with the opening on their left.
-    arcs: (m, 6), the five numbers of `Outline.arcs`, then 1 if the opening lies on the side of the arc's centre, else
-        -1.
+    arcs: (m, 6), for each arc x and y of the centre, the radius, the first and the last angle [rad], and 1 if the
+        opening lies on the side of the arc's centre, else -1.
     """
 
     segments: np.ndarray
@@ -74,7 +74,7 @@ class Boundary:
 def boundary(pieces: Outline, contains: Contains) -> Boundary:
     """Return the boundary of the region that `contains` describes.
 
-    pieces: edges of all shapes. The boundary consists of parts of these edges.
+    pieces: edges of all shapes that are combined to the region. The boundary consists of parts of these edges.
     contains: function that returns a mask of the points (x, y) in the region.
 
     Raises:
@@ -102,7 +102,7 @@ def _check(outline: Outline, pieces: Outline, contains: Contains) -> None:
     The area and the quadrature follow from the outline alone. Without this comparison, a shape that is missing in the
     outline would remain unnoticed.
 
-    pieces: edges of all shapes. The lines pass through them.
+    pieces: edges of all shapes that are combined to the opening. The lines cross these edges.
     contains: see `boundary`.
 
     Raises:
@@ -129,9 +129,10 @@ def _check(outline: Outline, pieces: Outline, contains: Contains) -> None:
 
 
 def _edges(middle: np.ndarray, left: np.ndarray, pieces: Outline, contains: Contains) -> tuple[np.ndarray, np.ndarray]:
-    """Return a mask of the pieces that belong to the boundary, and a mask of pieces with the opening on their right.
+    """Return masks of the pieces on the boundary of an opening, and of the pieces with the opening on their right.
 
-    Pieces of the boundary lie between open and closed areas. If several pieces coincide, only the first is kept.
+    A piece is a part of an edge of a shape. Pieces of the boundary lie between open and closed areas. If several
+    pieces coincide, only the first is kept.
 
     middle, left: midpoints of the pieces, and unit normals that point to their left, (n, 2) each.
 
@@ -199,8 +200,8 @@ def _meeting_points(pieces: Outline) -> np.ndarray:
     """Return all points (n, 2) at which the lines and circles of the pieces intersect, and the ends of the pieces.
 
     Each point is computed once and cuts both pieces. If two edges almost coincide, the position of their intersection
-    is ill-conditioned. If it were computed once for each piece, the results could differ and leave a gap in the
-    outline.
+    is ill-conditioned. If this position were computed separately for each of the two edges, the results could differ
+    and leave a gap in the outline.
     """
     found = [pieces.ends]
     low, high = pieces.segments.min(axis=1) - SHORTEST * 2, pieces.segments.max(axis=1) + SHORTEST * 2
@@ -231,7 +232,10 @@ def _of_lines(start: np.ndarray, along: np.ndarray, starts: np.ndarray, alongs: 
 
 
 def _of_line_and_circle(start: np.ndarray, along: np.ndarray, arc: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2) at which the line of a segment intersects the circle of an arc."""
+    """Return the points (n, 2) at which the infinite line through a segment intersects the circle of an arc.
+
+    The segment is given by its start and the vector `along` from there to its end.
+    """
     offset, size = start - arc[:2], float(along @ along)
     middle = -(offset @ along) / size
     rest = (arc[2] ** 2 - np.sum((offset + middle * along) ** 2)) / size
@@ -258,7 +262,7 @@ def _of_circles(arc: np.ndarray, other: np.ndarray) -> np.ndarray:
 def _between(places: np.ndarray, low: float, high: float, shortest: float) -> np.ndarray:
     """Return `low`, `high` and the places between them, in ascending order.
 
-    A place is omitted if it lies within `shortest` of the next lower place, of `low` or of `high`.
+    A place is omitted if its distance from the next lower place, from `low` or from `high` is at most `shortest`.
     """
     inside = np.sort(places[(places > low + shortest) & (places < high - shortest)])
     kept = inside[np.diff(inside, prepend=low) > shortest]

@@ -106,7 +106,7 @@ class Annulus(Aperture):
 
 @dataclass(frozen=True)
 class SoftAnnulus(SoftAperture):
-    """Difference of two soft disks; a single soft disk if `inner` is 0."""
+    """A ring with soft edges: the difference of two disks with soft edges; a single such disk if `inner` is 0."""
 
     rotationally_symmetric: ClassVar[bool] = True
     edge: SoftEdge
@@ -137,9 +137,9 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
 
     A(ρ) = ∫ g(r) r θ(ρ, r) dr, where g is the kernel and R the radius of the disk. θ = 2 arccos((ρ² + r² - R²)/(2ρr))
     is the angle over which a circle of radius r about the point at ρ lies inside the disk. The angle θ varies only for
-    r from |ρ - R| to ρ + R. Near both ends of this range, it varies like a square root. Let s be the length of this
-    range within the kernel's reach. The substitution r = |ρ - R| + s sin²(πu/2), with u from 0 to 1, makes the
-    integrand smooth.
+    r from |ρ - R| to ρ + R. Near both ends of this range, it varies like a square root. Let s be the length of the
+    part of this range that lies within the kernel's reach. The substitution r = |ρ - R| + s sin²(πu/2), with u from 0
+    to 1, makes the integrand smooth.
     """
     rho = np.maximum(np.abs(np.asarray(distance, dtype=np.float64)), 1e-9 * radius)[:, None]
     lower = np.abs(rho - radius)
@@ -159,7 +159,7 @@ def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Node
 
     Smaller circles have fewer nodes. The rule represents the edge exactly and converges spectrally. Over a full disk,
     the integrand's mean on the circle of radius r is a smooth function of r². For low spatial frequencies,
-    Gauss-Legendre nodes along r² instead of r are therefore fewer, and are used.
+    fewer Gauss-Legendre nodes along r² than along r are therefore needed. Nodes along r² are used in this case.
 
     cycles: highest spatial frequency of the integrand [cycles per pupil radius].
     digits: number of accurate digits. For integrands of at most 1, the error is at most 10^-digits times the area.
@@ -173,7 +173,7 @@ def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Node
 
 @lru_cache(maxsize=256)
 def _ring_rule(inner: float, outer: float, cycles: float, digits: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the radii of the circles of nodes, their weights, and the number of nodes on each circle."""
+    """Return the circles on which the nodes of `ring_nodes` lie: radii, weights, and number of nodes on each circle."""
     digits += 0.3  # log10 2: each of the two rules, in radius and in angle, may contribute half the error
     span = outer - inner
     u, weight = gauss_legendre(gauss_legendre_count(cycles * span, digits))

@@ -77,6 +77,6 @@ def _bessel_j0(r: np.ndarray, k: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _bessel_table(size: float) -> np.ndarray:
-    """Return J₀ at the first `size` multiples of BESSEL_STEP, from 0 on."""
+    """Return J₀ at 0, BESSEL_STEP, 2 · BESSEL_STEP and so on, `size` values in all. `size` is a whole number."""
     parts = np.array_split(BESSEL_STEP * np.arange(int(size)), max(1, int(size) // 1024))
     return np.concatenate([bessel_j(0, part) for part in parts])

@@ -54,7 +54,7 @@ class Outline(ReadOnlyArrays):
 
     @property
     def ends(self) -> np.ndarray:
-        """Ends of all pieces, (n, 2)."""
+        """Points (x, y) at both ends of every segment and arc, array (end, 2)."""
         cx, cy, radius, *angles = self.arcs.T
         return np.concatenate(
             [self.segments.reshape(-1, 2)]
@@ -98,8 +98,8 @@ class Outline(ReadOnlyArrays):
     def crossings(self, y: np.ndarray) -> np.ndarray:
         """Return the ascending positions x at which the edge crosses horizontal lines, array (line, crossing).
 
-        All lines must cross the same segments and arcs. Between the lines, there must therefore be none of the heights
-        in `turning`.
+        All lines must cross the same segments and arcs. No segment or arc may therefore end, and no arc may have its
+        highest or lowest point, at a height between the lines.
 
         y: heights of the lines, (line,)
         """
@@ -120,7 +120,7 @@ class Outline(ReadOnlyArrays):
         return np.sort(np.array(found).reshape(-1, len(y)).T, axis=1)
 
     def heights(self, x: float) -> np.ndarray:
-        """Return the heights y at which the edge crosses the vertical line at x, in no order."""
+        """Return the heights y at which the edge crosses the vertical line at x. They are not sorted."""
         found = []
         for cx, cy, radius, begin, end in self.arcs:
             if abs(x - cx) < radius:
@@ -149,9 +149,9 @@ class Outline(ReadOnlyArrays):
 
     @cached_property
     def tangent(self) -> np.ndarray:
-        """Heights of the tops and bottoms of the circles to which the arcs belong.
+        """Heights of the highest and the lowest points of the circles of which the outline's arcs are parts.
 
-        They are included even if an arc does not extend to the top or bottom of its circle.
+        They are included even if an arc does not extend to the highest or lowest point of its circle.
 
         Near such a height, the position x at which an arc crosses a horizontal line changes with the height of the line
         like a square root.

@@ -4,11 +4,11 @@ One such integrand contains the phase of a relief of pixels, which jumps at thei
 derivative of a spline with respect to one of its samples. This derivative bends at the knots of the spline, because it
 is a different polynomial in every cell between knots. For such an integrand, "pixels" means these cells.
 
-Pixels that lie wholly inside have Gauss-Legendre nodes. Pixels that the opening's edge cuts can be treated in two ways.
-`PixelatedAperture.nodes` divides a cut pixel into panels, which are horizontal bands, at the heights at which the edge
-enters or leaves the pixel (see `strips`). If the nodes must lie on rows and columns, cut pixels have the same nodes as
-whole pixels, and `PixelatedAperture.weights` returns weights that integrate the interpolating polynomial over the open
-part of each pixel.
+Pixels that lie wholly inside have Gauss-Legendre nodes. If the opening's edge cuts a pixel, there are two methods.
+`PixelatedAperture.nodes` divides the cut pixel into panels, which are horizontal bands (see `strips`). Panels begin and
+end at the heights at which the edge enters or leaves the pixel. If the nodes must lie on rows and columns, cut pixels
+have the same nodes as whole pixels, and `PixelatedAperture.weights` returns weights that integrate the interpolating
+polynomial over the open part of each pixel.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ class PixelatedAperture(Aperture):
     def squares(opening: Aperture, count: int) -> PixelatedAperture:
         """Return the opening tiled by count x count square pixels of the same size.
 
-        Repeated calls return the same object. It keeps its masks of the pixels that the opening's edge cuts, so they
-        need not be computed for every pupil.
+        Repeated calls return the same object. The object stores which pixels the opening's edge cuts, so this is
+        computed only once, even if many pupils have this opening.
         """
         return _squares(opening, count)
 
@@ -89,11 +89,10 @@ class PixelatedAperture(Aperture):
         return self.opening.contains(x, y)
 
     def nodes_across(self, cycles: float, digits: float) -> int | None:
-        """Return the number of quadrature nodes along a side of a pixel if all nodes lie on common rows and columns.
+        """Return the number of nodes along a side of a pixel if all nodes lie on rows and columns through the square.
 
-        The number is the field `fixed` if that is not None. Otherwise the integral over the pupil, a weighted sum over
-        the nodes, is as accurate with this number as with the nodes that `nodes` returns for the same arguments. None:
-        more than 32 nodes would be needed.
+        The number is the field `fixed` if that is not None. Otherwise it is large enough for the accuracy of the nodes
+        that `nodes` returns for the same arguments. None: more than 32 nodes would be needed.
         """
         if self.fixed is not None:
             return self.fixed
@@ -115,9 +114,9 @@ class PixelatedAperture(Aperture):
         return float(self._widths.max())
 
     def rows(self, across: int) -> np.ndarray:
-        """Return the positions [pupil radii] of the rows of nodes, in ascending order, array (count · across,).
+        """Return the positions [pupil radii] of the rows of nodes, in ascending order, array (row,).
 
-        The columns have the same positions.
+        There are `across` rows of nodes in each row of pixels. The columns have the same positions.
 
         across: number of nodes along a side of a pixel.
         """
@@ -144,7 +143,7 @@ class PixelatedAperture(Aperture):
 
     @cached_property
     def _near(self) -> np.ndarray:
-        """Mask of the pixels that the edge may cut, (row, column)."""
+        """Mask of the pixels that the opening's edge may cut, (row, column)."""
         half = np.maximum.outer(self._widths, self._widths) / 2
         return self.outline.near(self._centres[None, :], self._centres[:, None], half)
 

@@ -50,11 +50,11 @@ class Rings(Aperture):
     ) -> Rings:
         """Return a zone plate: every second Fresnel zone for a focal length and a wavelength. All lengths are in m.
 
-        Parallel light from these zones arrives in phase at one focal length behind the pupil. Zone n ends at the radius
-        √(nλf + n²λ²/4), for the focal length f and the wavelength λ (Fresnel). A tenth of the incident light, 1/π²,
-        reaches this focus.
+        If parallel light falls on the pupil, the light from all open zones arrives in phase at the focus, one focal
+        length behind the pupil. Zone n ends at the radius √(nλf + n²λ²/4), for the focal length f and the wavelength λ
+        (Fresnel). A tenth of the incident light, 1/π², reaches this focus.
 
-        wavelength: wavelength behind the pupil, which is that in vacuum divided by `Pupil.medium_n`.
+        wavelength: wavelength behind the pupil, equal to the vacuum wavelength divided by `Pupil.medium_n`.
         open_centre: True if the central zone is open, False if its neighbour is.
 
         Raises:

@@ -5,8 +5,8 @@ aperture's spectrum unchanged up to the frequency `passband` and makes it 0 beyo
 `ripple`. The kernel is 0 beyond the radius `reach`. The transmittance therefore stays 1 or 0 at larger distances from
 the edge. Lengths are in units of the pupil's radius R, frequencies in cycles per R.
 
-Jumps between pixels are softened by the product of one kernel along x and one along y (`SoftEdge.line`), with the same
-Kaiser window and the same frequencies.
+If the pupil has a relief of square pixels, the light jumps at their borders. These jumps are softened by the product of
+one kernel along x and one along y (`SoftEdge.line`), with the same Kaiser window and the same frequencies.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ class SoftEdge:
         return float(weights @ self._bare_line(nodes))
 
     def _bare_line(self, x: np.ndarray) -> np.ndarray:
-        """Return the result of `line` without normalisation."""
+        """Return the kernel along one axis, as `line` does, but without scaling its integral to 1."""
         window = np.i0(self.beta * np.sqrt(np.maximum(1 - (x / self.reach) ** 2, 0)))
         found: np.ndarray = np.sinc((self.passband + self.stopband) * x) * window
         return found
@@ -127,7 +127,7 @@ class SoftEdge:
         return series / (whole(self.reach) - whole(0.0))
 
     def _bare(self, r: np.ndarray) -> np.ndarray:
-        """Return the result of `ring` without normalisation."""
+        """Return the kernel's weight on circles of radius r, as `ring` does, but without scaling its integral to 1."""
         cutoff = (self.passband + self.stopband) / 2
         window = np.i0(self.beta * np.sqrt(np.maximum(1 - (r / self.reach) ** 2, 0)))
         return bessel_j(1, 2 * pi * cutoff * r) * window

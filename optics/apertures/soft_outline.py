@@ -1,9 +1,12 @@
-"""Transmittance at any point of an opening with straight and circular edges, convolved with the soft edge's kernel.
+"""Transmittance, at any point, of a soft-edged opening whose edge consists of straight pieces and arcs.
 
-The method extends `soft_polygon` to arcs; G and H are defined there. Each piece of the edge contributes ∫ G(r) dθ to
-the transmittance, where θ is the angle that the piece subtends at the point. For an arc of radius R, let d be the
-distance of its centre from the point, and t the angle about the centre between the point and a position on the arc.
-Within the kernel's reach, the integrand is
+The opening is convolved with the kernel that `soft_edge` describes. The module `soft_polygon` explains the method for
+straight pieces and defines the functions G and H of the kernel. Here, the method is extended to arcs.
+
+Each piece of the edge contributes ∫ G(r) dθ to the transmittance at a point, where θ is the angle that the piece
+subtends at the point, and r the distance of the piece from the point. For an arc of radius R, let d be the distance of
+its centre from the point. Seen from the centre, t is the angle between the direction of the point and that of a
+position on the arc. Within the kernel's reach, the integrand is
 
     H(r) (R - d cos t) R dt.
 
@@ -88,9 +91,9 @@ def _arcs_share(edge: SoftEdge, arcs: np.ndarray, x: Array, y: Array, types: Pre
 
 
 class _Arc:
-    """Contribution of arcs to the transmittance.
+    """Contribution of an arc of an opening's edge to the transmittance of the soft-edged opening at points (x, y).
 
-    Arcs run counterclockwise around their centre. Points (x, y) are relative to the centre.
+    Arcs run counterclockwise around their centre. The coordinates of the points are relative to the centre.
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:
@@ -107,8 +110,8 @@ class _Arc:
     def share(self, x: Array, y: Array, radius: Array, begin: Array, end: Array) -> Array:
         """Return the contribution of the arc from `begin` to `end` [rad] to the transmittance at points (x, y).
 
-        The kernel of the soft edge around a point covers a part of the arc's circle. This part is centred on the
-        point's direction φ, seen from the centre of the circle, and has the half angle τ.
+        The kernel that softens the edge covers a disc around each point. This disc covers a part of the arc's circle.
+        The part is centred on the point's direction φ, seen from the centre of the circle, and has the half angle τ.
 
         Whole turns are added to φ until it lies between the arc's middle and one turn before the middle. The arc may
         then overlap the part around φ, the part around φ + 2π, or both.
@@ -148,9 +151,10 @@ class _Arc:
         return dr.atan2(cross, dot + TINY) + dr.select(between, 2 * pi, 0)
 
     def _integral(self, x: Array, y: Array, radius: Array, first: Array, last: Array, zero: Array) -> Array:
-        """Return ∫ H(r) (R - p·e(t)) R dt along an arc of radius R, for the point p and the unit vector e at angle t.
+        """Return ∫ H(r) (R - x cos t - y sin t) R dt along an arc of radius R.
 
-        H is the function of `radial_table`.
+        (x, y) is a point relative to the centre of the arc's circle. t is the angle [rad] of a position on the arc,
+        from `first` to `last`, and r the distance of this position from (x, y). H is the function of `radial_table`.
         """
         import drjit as dr
 

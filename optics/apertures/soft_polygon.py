@@ -52,9 +52,11 @@ class SoftPolygon(SoftAperture):
 
 
 def sides_share(edge: SoftEdge, starts: np.ndarray, ends: np.ndarray, x: Array, y: Array, types: Precision) -> Array:
-    """Return the contribution of straight segments to the transmittance.
+    """Return the contribution of straight pieces of an opening's edge to its transmittance at points (x, y).
 
-    starts, ends: (n, 2), ends of the segments, with the opening on their left.
+    The opening is convolved with the kernel `edge`.
+
+    starts, ends: both ends of each piece, with the opening on the left of the way from start to end, arrays (piece, 2).
     """
     import drjit as dr
 
@@ -87,9 +89,9 @@ class _Line:
     angle that the piece subtends at the point, divided by 2π. Otherwise, W depends on the end of the piece. If the
     piece ends within the disc, W is the integral ∫ d H(r) dt, where t runs from 0 to s, r² = d² + t², and H is the
     function that `radial_table` tabulates. If it ends outside the disc, consider the infinite half-line that begins at
-    the foot and contains the piece. The half-line contributes half of T(d) - 1/2, where T is the transmittance of a
-    soft-edged half-plane. T depends only on d and is tabulated. W is smaller by α/(2π), where α is the angle at the
-    point that the part of the half-line beyond the piece subtends.
+    the foot and contains the piece. The half-line contributes (T(d) - 1/2)/2, where T is the transmittance of a
+    soft-edged half-plane. T depends only on d and is tabulated. The rest of the half-line, beyond the end of the piece,
+    subtends an angle α at the point. W is the contribution of the half-line minus α/(2π).
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:
@@ -127,8 +129,8 @@ class _Line:
         The piece begins at the foot of the perpendicular from each point to the edge, and ends at the signed distance s
         along the edge. d is the signed length of the perpendicular, positive if the point lies on the inner side.
 
-        near: True if |d| is less than the kernel's reach. The disc of this radius around the point then contains a
-            chord of the line.
+        near: True if |d| is less than the radius at which the kernel that softens the edge ends. The disc of this
+            radius around the point then contains a chord of the line.
         half: half the length of the chord.
         chord: contribution of the infinite half-line that begins at the foot; 0 if there is no chord.
         zero: zeros, one for each point.

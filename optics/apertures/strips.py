@@ -1,8 +1,8 @@
 """Quadrature over the part of a rectangle that an outline encloses.
 
-The rectangle is divided into panels, which are horizontal bands, at the heights at which the outline enters or leaves
-the rectangle, and at the heights of the corners, tops and bottoms of the outline. Within a panel, nodes lie on
-horizontal chords that end exactly at the edge, so the quadrature converges spectrally.
+The rectangle is divided into panels, which are horizontal bands. Panels begin and end at the heights at which the
+outline enters or leaves the rectangle, and at the heights of the corners, tops and bottoms of the outline. Within a
+panel, nodes lie on horizontal chords that end exactly at the edge, so the quadrature converges spectrally.
 """
 
 from __future__ import annotations

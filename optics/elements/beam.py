@@ -48,16 +48,17 @@ class Beam:
     def aperture(self) -> Aperture:
         """Aperture of the pupil.
 
-        If the pupil has a relief of square pixels that bends the light, the aperture is divided into these pixels.
+        If the pupil has a relief that consists of square pixels, and this relief bends the light, the aperture is
+        divided into these pixels.
         """
         pixels = self.pupil.pixels if self.pupil.bends(self.wavelength) else 0
         return PixelatedAperture.squares(self.pupil.aperture, pixels) if pixels else self.pupil.aperture
 
     def waves(self, x: Array, y: Array) -> Array:
-        """Return the optical path from the source through points (x, y) [m] of the pupil, in vacuum wavelengths.
+        """Return the optical path from the source to points (x, y) [m] just behind the pupil, in vacuum wavelengths.
 
-        It is relative to the path through the centre without relief and wavefront. For the types of the arrays, see
-        `Relief.height`.
+        It is relative to the path that light through the pupil's centre would have if the pupil had no relief and added
+        no wavefront. For the types of the arrays, see `Relief.height`.
         """
         return self.pupil.path(x, y, self.wavelength, self.source) * like(x, 1 / self.wavelength)
 
@@ -66,7 +67,10 @@ class Beam:
         return self.at(soft, *grid.coordinates(types), grid, types)
 
     def at(self, soft: SoftAperture, x: Array, y: Array, grid: Grid, types: Precision) -> Field:
-        """Return the field just behind the pupil at arbitrary points (x, y) [m], one for each sample of the grid."""
+        """Return the field just behind the pupil at points (x, y) [m], which need not be the points of the grid.
+
+        There must be as many points as samples of the grid. The values are stored as samples of a field on the grid.
+        """
         scale = 1 / opaque(types, self.radius)
         size = soft.transmittance(x * scale, y * scale, types)
         if self.pupil.mask is not None:

@@ -1,4 +1,4 @@
-"""A wave that converges on a point of an image plane. Its samples come from objects of other optics programs."""
+"""A wave that converges on a point of an image plane, sampled by another optics program."""
 
 from __future__ import annotations
 
@@ -61,15 +61,17 @@ class ConvergingWave:
         return found
 
     def moved(self, shift: float, medium_n: float, position: tuple[float, float] | None = None) -> ConvergingWave:
-        """Return the wave relative to a sphere around another point.
+        """Return the same wave, compared with a reference sphere around another point.
 
-        shift: distance [m] by which the image plane is moved along the light.
+        The present reference sphere is centred on the point of the image plane on which the wave converges.
+
+        shift: distance [m] by which the image plane is moved, positive in the direction of the light.
         medium_n: refractive index behind the pupil.
-        position: the new point (x, y) [m] on the image plane. None: the point at which the ray from the pupil's centre
-            to the old point crosses the moved plane.
+        position: the new centre (x, y) [m], on the moved image plane. None: the point at which the ray from the pupil's
+            centre to the present centre crosses the moved plane.
 
         Raises:
-            ValueError: a position is given although the position of the old point is unknown.
+            ValueError: a new centre is given although the present centre is unknown.
         """
         if position is not None and self.position is None:
             raise ValueError("the position of the image is unknown: this object does not contain it")
@@ -108,7 +110,7 @@ def is_of_samples(system: Any) -> bool:
 
 
 def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave:
-    """Convert the rays in a pupil, which an object of another optics program contains, to a converging wave.
+    """Return the converging wave whose rays through a pupil are listed by an object of another optics program.
 
     system: the object, such as optiland's WavefrontData. Its attributes are pupil_x, pupil_y, pupil_z and radius [mm],
         and opd [waves].
@@ -149,7 +151,7 @@ def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave
 
 
 def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWave:
-    """Convert the samples on a grid in a pupil, which an object of another program contains, to a converging wave.
+    """Return the converging wave whose samples on a grid in a pupil are stored in an object of another optics program.
 
     system: the object, such as prysm's Wavefront. Its attributes are data (complex), dx [mm] and wavelength [µm]. The
         samples in `data` lie on a plane that is parallel to the image plane.

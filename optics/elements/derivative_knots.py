@@ -1,10 +1,11 @@
-"""Inputs of a PSF that carry derivatives, and cells of the pupil in which these derivatives are smooth.
+"""Cells of the pupil in which derivatives of a PSF are smooth, and the inputs with respect to which they are requested.
 
-The derivative of the light behind the pupil with respect to one sample of a map is proportional to a cardinal spline
-times the light. If the map is a mask, this is the light that would pass the pupil without the mask. The spline is a
-different cubic polynomial in every cell between two knots, whatever the values of the map are. Even if a map is flat,
-derivatives with respect to its samples therefore contain the fine detail of these splines. Samples of the pupil that
-resolve only the light give wrong derivatives. Quadrature nodes in each cell are used instead.
+A map is a relief, wavefront or mask that is given by samples. The derivative of the light behind the pupil with respect
+to one sample is proportional to a cardinal spline times that light. If the map is a mask, the spline is multiplied
+instead by the light that would pass the pupil without the mask. The spline is a different cubic polynomial in every
+cell between two knots, whatever the values of the map are. Even if a map is flat, derivatives with respect to its
+samples therefore contain the fine detail of these splines. Samples of the pupil that resolve only the light give wrong
+derivatives. Quadrature nodes in each cell are used instead.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ APART = 1e-9  # rounding: borders that are closer, in pupil radii, are the same
 
 @dataclass(frozen=True)
 class DerivativeKnots:
-    """Rectangular cells of the square around the pupil. In each cell, derivatives by the samples of maps are smooth.
+    """Cells of the square around the pupil, in which derivatives with respect to samples of maps are smooth.
 
     A map is a relief, wavefront or mask that is given by samples and interpolated by cubic splines. Each row and each
     column of samples is a knot, at which a spline changes from one polynomial to another. The knots of all maps that
@@ -39,8 +40,9 @@ class DerivativeKnots:
 
     borders: ascending borders of the cells, the same along x and along y, in units of the pupil's radius, from -1 to 1.
         If the relief consists of pixels, the borders between them are included.
-    splines: number of cubic splines, 1 or 2, by which the light from the rest of the pupil is multiplied in a
-        derivative. The number is 2 if the mask carries derivatives and the relief, the wavefront or both do as well.
+    splines: largest number of cubic splines, 1 or 2, in the derivative of the light with respect to a sample. Besides
+        the spline of this sample, the mask may be a spline. The number is 2 if the mask carries derivatives and the
+        relief, the wavefront or both do as well.
     maps: text with the name, rows and columns of each map that carries derivatives, such as "height: 32 x 32".
     names: names of these maps, which are names of arguments of `Pupil`.
     """
@@ -62,12 +64,13 @@ class DerivativeKnots:
 
 
 def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
-    """Return the cells into which knots of maps divide the pupil; None if no map carries derivatives.
+    """Return cells in which derivatives with respect to samples of maps are smooth; None if no map carries any.
 
     A map is a relief, wavefront or mask that is given by samples. Its knots are the rows and columns of samples. The
     derivative of the light with respect to a sample is proportional to a cubic spline, which is a single polynomial
-    only in each cell between two knots. Only knots of maps that carry derivatives are used. This includes a relief
-    whose refractive index carries a derivative, because that derivative is proportional to the height.
+    only in each cell between two knots. Only knots of maps that carry derivatives are used. A relief counts as such a
+    map also if only its refractive index carries a derivative, because the derivative of the light with respect to the
+    index is proportional to the height.
 
     wavelength: vacuum wavelength [m]. A relief is ignored if its index at this wavelength equals that of the medium
         around it and carries no derivative.

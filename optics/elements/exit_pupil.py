@@ -30,7 +30,7 @@ RMS_DIGITS = 8.0
 
 @dataclass(frozen=True, eq=False)
 class ExitPupil:
-    """The exit pupil and the wavefront of a lens that was computed by another optics program.
+    """The exit pupil of a lens and the wavefront in it, both computed by another optics program.
 
     Both were read from an object of that program, such as optiland's WavefrontData or prysm's Wavefront. The wavefront
     is relative to the reference sphere, whose centre is the image point in that program.
@@ -39,10 +39,10 @@ class ExitPupil:
         `distance` has the axes of the image plane, and the PSF's origin is the centre of the sphere.
     distance: radius [m] of the reference sphere.
     residual: root mean square [m] of the difference between the wavefront and the fitted Zernike modes.
-    position: centre (x, y) [m] of the sphere, along the axes of the image plane from the origin of coordinates in the
-        other program; None if the program's object does not contain this position, as with prysm's Wavefront.
-    sines: components (x, y) along the image plane of the direction of the light at the pupil's centre. (0, 0):
-        perpendicular to the image plane.
+    position: centre (x, y) [m] of the sphere. x and y are measured along the image plane, from the other program's
+        origin of coordinates. None if the program's object does not contain this position, as with prysm's Wavefront.
+    sines: direction of the ray from the pupil's centre to the centre of the sphere, as the components (x, y) of its
+        unit vector along the image plane. (0, 0): perpendicular to the image plane.
     wave: the samples from the other program.
     order: highest radial order of the Zernike modes.
     """
@@ -102,8 +102,8 @@ class ExitPupil:
         To compute PSFs out of focus, move the image plane in this way. Light that arrives at an angle then also moves
         along the plane. `optics.psf` at another sensor distance would ignore this movement.
 
-        origin: point (x, y) [m] of the image plane that becomes the origin of the PSF. Exit pupils of several
-            wavelengths with a common origin include lateral colour. None: the point that the ray through the pupil's
+        origin: point (x, y) [m] of the image plane that becomes the origin of the PSF. If it is the same at several
+            wavelengths, the PSFs show the lens's lateral colour. None: the point that the ray through the pupil's
             centre hits.
 
         Raises:

@@ -42,7 +42,7 @@ class ExitPupils(ReadOnlyArrays):
 
     @property
     def lateral_colour(self) -> np.ndarray:
-        """Positions [m] of the images of the field points relative to those at the middle wavelength.
+        """Displacements (x, y) [m] of the images of the field points from their positions at the middle wavelength.
 
         Array (field, wavelength, 2).
         """
@@ -52,10 +52,11 @@ class ExitPupils(ReadOnlyArrays):
         """Return the exit pupils of a field at all wavelengths, with one origin on the image plane.
 
         Sums over the PSFs of these pupils include lateral colour. The origin is the image of the field point at the
-        middle wavelength.
+        middle wavelength. On a moved plane, it is the point that the ray through the pupil's centre hits at this
+        wavelength.
 
         field: number of the field, counted from 0.
-        shift: distance [m] by which the image plane is moved along the light.
+        shift: distance [m] by which the image plane is moved, positive in the direction of the light.
 
         Raises:
             ValueError: there is no such field, or the shift is longer than half the distance to a pupil.

@@ -1,7 +1,7 @@
 """Highest spatial frequencies of a map that is sampled over a square, such as a relief, wavefront or mask.
 
-They determine how fine a grid must be and how far light is scattered. The unit is one cycle per half the side of the
-square. If the square encloses the pupil, half its side is the pupil's radius.
+They determine how fine a grid must be and how far light is scattered. Frequencies are in units of 1/h, where h is half
+the side of the square. If the square encloses the pupil, h is the pupil's radius.
 """
 
 from __future__ import annotations
@@ -39,9 +39,10 @@ def band_of(samples: np.ndarray, level: float) -> float:
 def power_beyond(samples: np.ndarray) -> np.ndarray:
     """Return, for each frequency, the power (mean square) of a map's components at this frequency and above.
 
-    The map is sampled over a square. Half the side of the square is the unit of length. Entry k of the result is the
-    total power of all components with a frequency along x, along y or both of at least k/4 cycles per unit of length.
-    The result has one entry for each sample along the axis with more samples.
+    The map is sampled over a square. Half the side of the square is the unit of length. Each component has one
+    frequency along x and one along y. Entry k of the result is the total power of all components for which the larger
+    of these frequencies is at least k/4 cycles per unit of length. The result has one entry for each sample along the
+    axis with more samples.
 
     The best-fitting bicubic polynomial is subtracted first, because a polynomial bends light and does not scatter it.
     The cosine transform continues the samples by their mirror images, without jumps. The ends of the samples therefore

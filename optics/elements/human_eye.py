@@ -53,8 +53,8 @@ PERFECT_NM = 555.0  # wavelength for the perfect lens in `mean_human_mtf`
 class HumanEye:
     """A reduced eye: one refracting surface between air and the medium "chromatic_eye", with an additional wavefront.
 
-    The surface has the chromatic aberration of a human eye and no other aberration at 570 nm. The medium is Thibos',
-    see `optics.medium`.
+    The surface has the chromatic aberration of a human eye and no other aberration at 570 nm. `optics.medium` describes
+    the medium, which is that of Thibos' reduced eye.
 
     aperture_radius: radius [m] of the pupil, at most the radius of the circle over which the wavefront is known.
     wavefront: additional wavefront. "standard_observer" (Autrusseau, Thibos & Shevell 2011, known up to a radius of 3
@@ -94,7 +94,7 @@ class HumanEye:
 
     @cached_property
     def pupil(self) -> Pupil:
-        """Pupil of the eye, for functions such as `optics.psf`. Pass them `focal_length` as the sensor's distance."""
+        """Pupil of the eye, for functions such as `optics.psf`. Set their sensor distance to `focal_length`."""
         humour = medium("chromatic_eye")
         paraboloid = BSplineRelief.paraboloid(0.0, 1 / SURFACE, self.aperture_radius)
         reported = self._reported
@@ -117,7 +117,7 @@ class HumanEye:
     def frequency(self, cycles_per_degree: Any) -> np.ndarray:
         """Convert frequencies [cycles/degree], an array of any shape, to cycles per metre on the retina.
 
-        `optics.MTF.profile` expects the result.
+        `optics.MTF.profile` takes frequencies in cycles per metre.
 
         Raises:
             ValueError: a number is negative or invalid.
@@ -125,10 +125,10 @@ class HumanEye:
         return _not_negative(cycles_per_degree) * (180 / math.pi) / self._nodal_distance
 
     def sensor_width(self, fov_deg: float) -> float:
-        """Return the side [m] of the retinal patch that sees a square field of this width: 2 tan(fov/2) f/n.
+        """Return the side [m] of the retinal square on which a square field of view is imaged: 2 tan(fov/2) f/n.
 
-        f is `focal_length`, and n the index of the eye's medium. Use the result as `sensor_width` of an `optics.Eye`
-        with this eye's pupil.
+        fov is the angle `fov_deg` between opposite sides of the field, f is `focal_length`, and n is the index of the
+        eye's medium. Use the result as `sensor_width` of an `optics.Eye` with this eye's pupil.
 
         Raises:
             ValueError: fov_deg is outside [1e-3, 170].
@@ -151,7 +151,7 @@ class HumanEye:
         By Gauss's theorem, they are the means of 2 W (cos φ, sin φ) / a over the rim of the pupil, where W is the
         wavefront at the azimuth φ and a the pupil's radius. The mean over RIM points is exact.
 
-        radius: radius [m] of the circle to which the coefficients refer.
+        radius: radius [m] of the circle over which the Zernike modes of the wavefront are defined.
         """
         angle = 2 * np.pi * np.arange(RIM) / RIM
         normal, part = np.stack([np.cos(angle), np.sin(angle)]), self.aperture_radius / radius

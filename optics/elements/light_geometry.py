@@ -1,7 +1,8 @@
 """Sources, ideal lenses and media of several beams. Reliefs and wavefronts of the pupils are not included.
 
 Users often compute many PSFs that differ in the relief or wavefront only. The sources, lenses and media of these PSFs
-are then cached, together with those results of planning the computation that depend only on them.
+are then cached. Some steps in planning the computation depend only on sources, lenses and media, and the results of
+these steps are cached as well.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class LightGeometry:
 
     @cached_property
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """All fields as arrays (beam,)."""
+        """All attributes of the class, in the order of its arguments, each as an array (beam,)."""
         rows = self.radius, self.distance, self.vacuum_wavelength, self.behind, self.before, self.focal, self.source
         return tuple(read_only(np.array(row, float)) for row in rows)
 
@@ -63,9 +64,10 @@ class LightGeometry:
         return [(read_only(index), read_only(r)) for index, r in known if np.isfinite(r).any()]
 
     def waves(self, x: np.ndarray, y: np.ndarray) -> np.ndarray | float:
-        """Return the sum of the spherical waves' paths at points (x, y) [m], in vacuum wavelengths, up to a constant.
+        """Return the optical path at points (x, y) [m] due to ideal lenses and sources on the axis, in waves.
 
-        The shape is (beam, y, x). Without spherical waves, the result is the number 0.
+        Each lens or source adds a spherical wave. The path is relative to the centre of the pupil, and the unit is the
+        vacuum wavelength. Without spherical waves, the result is the number 0, otherwise an array (beam, y, x).
 
         x, y: points, (beam, y, x).
         """

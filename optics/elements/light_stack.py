@@ -128,7 +128,11 @@ class LightStack:
 
     @cached_property
     def _polynomials(self) -> tuple[np.ndarray, list[int]]:
-        """Coefficients of `powers_of` for each beam, and the beams whose relief or wavefront is not a polynomial."""
+        """Coefficients of polynomial reliefs and wavefronts (see `powers_of`), and the beams without such polynomials.
+
+        The coefficients of a beam are 0 if its relief or wavefront is not a polynomial. The second result contains the
+        indices of these beams.
+        """
         known = [
             powers_of(beam.pupil, beam.wavelength, step)
             for beam, (_, _, step) in zip(self.beams, self._indices, strict=True)
@@ -142,7 +146,7 @@ class LightStack:
 
     @cached_property
     def mapped(self) -> np.ndarray:
-        """True for beams whose relief or wavefront is not a polynomial and may have fine detail, (beam,)."""
+        """True for beams whose relief or wavefront may have fine detail because it is not a polynomial, (beam,)."""
         return read_only(np.isin(np.arange(len(self.beams)), self._polynomials[1]))
 
     @cached_property
@@ -181,14 +185,14 @@ class LightStack:
         return down[:, :, None] * across[:, None]
 
     def polynomial_waves(self, powers: np.ndarray) -> np.ndarray:
-        """Return the paths of polynomial reliefs and wavefronts, in waves, up to a constant, (beam, point)."""
+        """Return the optical paths [waves] of polynomial reliefs and wavefronts, up to a constant, (beam, point)."""
         coefficients = self._polynomials[0].reshape(len(self.beams), 1, -1)
         return np.asarray((coefficients @ powers.reshape(len(powers), coefficients.shape[2], -1))[:, 0])
 
     def _other_path(self, place: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the part of one beam's optical path [m] that neither polynomials nor `geometry` describe.
 
-        It is due to oblique light, and to the relief and the wavefront unless both are polynomials.
+        It is due to oblique light. If the relief or the wavefront is not a polynomial, it includes the paths of both.
         """
         beam, total = self.beams[place], np.zeros(np.broadcast_shapes(x.shape, y.shape))
         pupil = beam.pupil
@@ -210,11 +214,11 @@ class LightStack:
         return found
 
     def mask_cycles(self, levels: np.ndarray) -> np.ndarray:
-        """Return for each beam the frequency above which the mask varies by less than a level, array (beam,).
+        """Return for each beam the frequency above which the mask's detail is weaker than a level, array (beam,).
 
         The unit is one cycle per radius of the beam's pupil. The frequency is 0 for a pupil without a mask.
 
-        levels: level of each beam, as an amplitude, array (beam,).
+        levels: for each beam, the amplitude transmittance below which detail is negligible, array (beam,).
         """
         return np.array([
             0.0 if beam.pupil.mask is None else beam.pupil.mask.bandwidth(level, radius) * radius
@@ -225,7 +229,7 @@ class LightStack:
     def slopes(self) -> StackSlopes:
         """Slopes of the optical paths behind the pupils, at the points of a grid over the disk of each pupil.
 
-        A slope between these points may be larger than the largest one at the points.
+        Between these points, slopes may be larger than at any of the points.
         """
         others = self._polynomials[1]
         pieces = {place: self.beams[place].pupil.pieces(self.beams[place].wavelength) for place in others}
@@ -265,8 +269,8 @@ class LightStack:
     def _smooth_slopes(self, across: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the slopes along x and along y of the optical path, at `disk_points`, arrays (beam, point).
 
-        Only reliefs and wavefronts that are polynomials are included, and the spherical waves of ideal lenses and of
-        sources on the axis.
+        The path includes polynomial reliefs, polynomial wavefronts, and the spherical waves of ideal lenses and of
+        sources on the axis. Everything else is omitted.
         """
         coefficients = self._polynomials[0]
         by_x, by_y = _power_slopes(across, coefficients.shape[1])
@@ -285,7 +289,10 @@ def _powers(values: np.ndarray, count: int) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _power_slopes(across: int, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives of y^i x^j by x and by y at `disk_points`, (power of y · power of x, point)."""
+    """Return the derivatives of y^i x^j with respect to x and to y, at points (x, y) of the unit disk, two arrays.
+
+    i and j run from 0 to size - 1. The arrays have the shape (size · i + j, point). `disk_points` defines the points.
+    """
     _, x, y = disk_points(across)
     powers = np.arange(size)
     px, py = (at[None, :] ** powers[:, None] for at in (x, y))

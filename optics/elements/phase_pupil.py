@@ -1,8 +1,9 @@
 """Pupils whose phase is the same at every wavelength, such as metasurfaces and liquid-crystal elements.
 
-A relief delays light by the path (n - object_n) h, so its phase falls as the wavelength rises. A geometric phase does
-not depend on the wavelength. It is represented as a relief of a material whose index step is proportional to the
-wavelength, so that all methods and derivatives apply.
+A relief of height h and refractive index n delays light by the path (n - object_n) h, where object_n is the index of
+the medium in front of the pupil and around the relief. Its phase therefore falls as the wavelength rises. A geometric
+phase does not depend on the wavelength. Such a phase is represented as a relief of a material for which n - object_n is
+proportional to the wavelength. All methods and derivatives for pupils with a relief therefore apply.
 """
 
 from __future__ import annotations

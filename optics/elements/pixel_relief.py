@@ -20,7 +20,7 @@ REPETITIONS = 32  # choice: repetitions of the pixels' spectrum to include; at m
 
 @dataclass(frozen=True, eq=False)
 class PixelRelief(Relief):
-    """Heights [m] of n x n square pixels that fill the pupil's square: a stepped diffractive optical element.
+    """Heights [m] of n x n square pixels that fill the square around the pupil: a stepped diffractive element.
 
     samples: heights [m], (n, n), (y, x). To wrap a smooth height h to one wave and quantise it to N levels, use
         `np.round(h / step) % N * step`. For glass of index n in air, step = wavelength / (n - 1) / N.
@@ -51,21 +51,25 @@ class PixelRelief(Relief):
         return float(np.ptp(self._heights))
 
     def bandwidth(self, level: float) -> float:
-        """Return infinity, because jumps have no band limit; 0 if heights are equal and carry no derivatives."""
+        """Return infinity, because the jumps between pixels have components at all frequencies.
+
+        The result is 0 if all heights are equal and carry no derivatives. `level` has no effect.
+        """
         return 0.0 if self._level else math.inf
 
     def detail(self, level: float) -> float:
-        """Return 0, because `scatter` already includes all light that the pixels scatter."""
+        """Return 0: detail is not counted here, because `scatter` includes all light that the pixels scatter."""
         return 0.0
 
     def scatter(self, turns: float, opening: Aperture, share: float) -> float:
         """Return the frequency [cycles per radius] beyond which at most a fraction `share` of the light is scattered.
 
-        The limit holds for frequencies along x and along y. The power spectrum of the light behind the pupil is that of
-        the samples (a discrete Fourier transform), repeated periodically and multiplied by sinc², the power spectrum of
-        one pixel. The spectrum is computed up to its 32nd repetition on either side. The result is infinity if the
-        frequencies beyond this range contain more than `share` / 2 of the light along x or along y. It is 0 if all
-        heights within the aperture are equal.
+        At most `share` / 2 lies beyond this frequency along x, and at most `share` / 2 along y. The discrete Fourier
+        transform of the transmittance, with one sample per pixel, gives a power spectrum. This spectrum is repeated
+        periodically, up to 32 times on either side, and then multiplied by sinc², the power spectrum of one pixel. The
+        product is the power spectrum of the light behind the pupil. The result is infinity if more than `share` / 2 of
+        the light lies beyond the last repetition along x or along y. It is 0 if all heights within the aperture are
+        equal.
 
         turns: phase in waves per metre of height [1/m].
         opening: aperture of the pupil.
@@ -103,11 +107,11 @@ class PixelRelief(Relief):
 def _reach(power: np.ndarray, share: float) -> float:
     """Return the frequency [cycles per radius] beyond which at most the fraction `share` of the power lies.
 
-    The power spectrum is that of the samples, repeated periodically and multiplied by sinc², the power spectrum of one
-    pixel. It is computed up to its 32nd repetition (REPETITIONS) on either side. The result is infinity if more than
-    `share` of the power lies beyond this range.
+    The spectrum `power` is first repeated periodically, up to 32 times (REPETITIONS) on either side. It is then
+    multiplied by sinc², the power spectrum of one pixel. The result is infinity if more than `share` of the power lies
+    beyond the last repetition.
 
-    power: power spectrum of the samples, from a discrete Fourier transform.
+    power: discrete power spectrum of values with one sample per pixel.
     """
     n = len(power)
     order = np.arange(-(n // 2) - n * REPETITIONS, n - n // 2 + n * REPETITIONS)

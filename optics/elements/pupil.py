@@ -38,24 +38,24 @@ SENSOR_DISTANCE = 240e-6  # choice [m]: default distance of the sensor behind a 
 class Pupil:
     """A thin element with the amplitude transmittance A(x, y) M(x, y) exp(ik [(n - object_n) h(x, y) - W(x, y)]).
 
-    k is 2π/λ with the vacuum wavelength λ, and r the distance from the axis.
+    k is 2π/λ, where λ is the vacuum wavelength.
 
     aperture_radius: R [m].
-    height: h. None; an array [m] (y, x) of samples at cell centres over [-R, R]² (HeightMap); or any Relief.
+    height: h [m]: None (no relief), any Relief, or samples at cell centres over [-R, R]² (HeightMap), array (y, x).
     n: refractive index of the relief, constant or dispersive.
     medium_n: refractive index behind the pupil, constant or dispersive (`optics.medium`).
     object_n: refractive index in front of the pupil and around the relief. None: equal to medium_n.
-    thin_lens_focal_length: focal length f [m] of an additional ideal lens, exp(-ik medium_n (√(r² + f²) - f)). It
-        focuses parallel light of every wavelength at the distance f behind it. If f is negative, the factor is the
-        complex conjugate of that for |f|, and the lens diverges.
+    thin_lens_focal_length: focal length f [m] of an additional ideal lens, exp(-ik medium_n (√(r² + f²) - f)) at the
+        distance r from the axis. It focuses parallel light of every wavelength at the distance f behind it. If f is
+        negative, this factor is the complex conjugate of the factor for |f|, and the lens diverges.
     aperture: A, which is 1 in the opening and 0 elsewhere. Circle (default), Annulus, Rings, Polygon, Slit, or a
         `union`, `difference` or `intersection` of shapes.
-    wavefront: W [m in vacuum], the same at every wavelength. Zernike or WavefrontMap, over at least the pupil's circle.
+    wavefront: W [m in vacuum], the same at every wavelength: a Zernike or WavefrontMap that covers the pupil.
     mask: M, the transmitted amplitude: GaussianMask or MaskMap. A PSF is relative to the light that falls on the open
         aperture, so absorption in a mask reduces the PSF's sum.
 
-    Radius, height, n, focal length, coefficients or samples of W, and waist or samples of M may carry derivatives: as
-    Dr.Jit arrays (maps: Dr.Jit tensors) or, for `optics.torch.psf`, as PyTorch tensors.
+    These may carry derivatives, as Dr.Jit arrays (samples: Dr.Jit tensors) or, for `optics.torch.psf`, as PyTorch
+    tensors: aperture_radius, height, n, thin_lens_focal_length, W's coefficients or samples, and M's waist or samples.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
@@ -156,11 +156,11 @@ class Pupil:
 
     @property
     def pixels(self) -> int:
-        """Number of square pixels across the pupil; 0 unless the relief consists of such pixels of unequal height."""
+        """Number of pixels across the relief; 0 unless its square pixels differ in height or carry derivatives."""
         return 0 if self.height is None else int(self.height.pixels)
 
     def image_distance(self, source_distance: float) -> float:
-        """Return the default distance [m] of the sensor behind the pupil, without derivatives.
+        """Return the default distance [m] of the sensor behind the pupil, a number that carries no derivatives.
 
         Without a lens it is 240 µm. With a lens it is the image distance z for a source at a distance s, 1/z = 1/f -
         n₀/(n s). The indices n₀ in front of the pupil and n behind it are those at 550 nm.
@@ -218,14 +218,14 @@ class Pupil:
         return self.height is not None and (is_differentiable(step) or step != 0)
 
     def rotationally_symmetric(self, wavelength: float) -> bool:
-        """Return True if rotation is known to change neither the pupil nor its requested derivatives."""
+        """Return True if rotation keeps the transmittance and the derivatives that it carries; False if unknown."""
         relief_is = not self.bends(wavelength) or self.height.rotationally_symmetric
         wavefront_is = self.wavefront is None or self.wavefront.rotationally_symmetric
         mask_is = self.mask is None or self.mask.rotationally_symmetric
         return self.aperture.rotationally_symmetric and relief_is and wavefront_is and mask_is
 
     def mirror_symmetric(self, wavelength: float) -> bool:
-        """Return True if mirroring of x or y is known to change neither the pupil nor its requested derivatives."""
+        """Return True if x → -x and y → -y each keep the transmittance and derivatives it carries; False if unknown."""
         relief_is = not self.bends(wavelength) or self.height.mirror_symmetric
         wavefront_is = self.wavefront is None or self.wavefront.rotationally_symmetric
         mask_is = self.mask is None or self.mask.rotationally_symmetric
@@ -234,7 +234,7 @@ class Pupil:
     def path(self, x: Array, y: Array, wavelength: float, source: PointSource) -> Array:
         """Return the optical path [m] from the source through points (x, y) [m], arrays as in `Relief.height`.
 
-        It is relative to the path through the centre without relief and wavefront.
+        It is relative to the path through the centre of the same pupil without its relief and wavefront.
         """
         total = source.path(x, y) * like(x, self.index_before(wavelength))
         if self.thin_lens_focal_length is not None:
@@ -254,7 +254,7 @@ class Pupil:
     def pieces(self, wavelength: float) -> int:
         """Return the number of polynomial pieces across the relief or across the wavefront, whichever number is larger.
 
-        An absent wavefront counts 0, and so does a relief that does not bend light of this wavelength.
+        The number is 0 for a missing wavefront or relief, and for a relief that does not bend light of this wavelength.
         """
         pieces = [self.height.knots if self.bends(wavelength) else 0]
         pieces += [0 if self.wavefront is None else self.wavefront.knots]
@@ -268,8 +268,8 @@ class Pupil:
     def scatter(self, wavelength: float, share: float) -> float:
         """Return the frequency [1/m] along x and y beyond which at most a fraction `share` of the light is scattered.
 
-        It is the sum of such frequencies for the pixels or fine detail of the relief, the wavefront's fine detail, and
-        the mask. By Carson's rule, the whole bandwidth is this sum plus the largest ray slope divided by wavelength.
+        It is the sum of one such frequency for the relief, one for the wavefront, and one for the mask, without slopes.
+        By Carson's rule, the whole bandwidth is this sum plus the largest ray slope divided by wavelength.
         """
         bends, found = self.bends(wavelength), 0.0
         rough = sum(p is not None and p.scatters for p in (self.height if bends else None, self.wavefront))
@@ -287,7 +287,7 @@ class Pupil:
         return found if self.mask is None else found + self.mask.detail(light, self.radius)
 
     def bandwidth(self, wavelength: float, tolerance: float) -> float:
-        """Return f [1/m] so that components of phase [rad] and mask amplitude above f are smaller than `tolerance`.
+        """Return the spatial frequency [1/m] above which components of phase [rad] and of mask are below `tolerance`.
 
         A relief of square pixels is ignored, because its jumps are sampled separately.
         """

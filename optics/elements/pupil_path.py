@@ -1,7 +1,7 @@
 """Parts of a pupil's optical path that do not depend on the wavelength.
 
-Their sum, weighted by refractive indices, is the path: see `Pupil.path`. Light of several wavelengths and sources can
-therefore share them.
+The sum of these parts, weighted by refractive indices, is the path: see `Pupil.path`. The parts can therefore be
+computed once for several wavelengths and sources.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ __all__ = ["lens_path", "relief_height", "wavefront_ahead"]
 def lens_path(focal_length: Scalar, x: Array, y: Array) -> Array:
     """Return the length [m] by which an ideal lens shortens the path at points (x, y) [m].
 
-    It is √(r² + f²) - f, a path in vacuum, at the distance r from the axis, for a focal length f > 0. For f < 0, it is
-    the negative of the length for |f|. x and y are arrays as in `Relief.height`.
+    At the distance r from the axis, this length is √(r² + f²) - f in vacuum if the focal length f is positive. If f is
+    negative, it is minus the length for |f|. x and y are arrays as in `Relief.height`.
     """
     f, own = like(x, focal_length), library(x)
     r2 = x * x + y * y

@@ -34,9 +34,9 @@ CORNERS_PER_TERM = 4  # choice: corners of the hull per term of this series
 
 @dataclass(frozen=True, eq=False)
 class Rim:
-    """The rim of a pupil.
+    """The rim of a pupil, in positions [m] on a plane or in sines of directions (directions projected onto x and y).
 
-    middle: centre (x, y) of the circle around the pupil, in the unit of the samples.
+    middle: centre (x, y) of the circle around the pupil.
     radius: radius of this circle.
     vertices: corners (n, 2) of the rim relative to the middle, in units of the radius; None for a circle.
     """
@@ -55,7 +55,7 @@ class Rim:
         return self.aperture.contains((x - self.middle[0]) * scale, (y - self.middle[1]) * scale)
 
     def onto_plane(self, distance: float) -> Rim:
-        """Return this rim in positions [m] on a plane, if its coordinates are sines of directions.
+        """Return this rim, given in sines of directions, converted to positions [m] on a plane.
 
         The result is centred on the origin.
 
@@ -64,7 +64,7 @@ class Rim:
         return self._scaled(lambda r: distance * r / math.sqrt(1 - r * r))
 
     def in_sines(self, distance: float) -> Rim:
-        """Return this rim in sines of directions, if its coordinates are positions [m] on a plane.
+        """Return this rim, given in positions [m] on a plane, converted to sines of directions.
 
         The result is centred on the origin.
 
@@ -73,7 +73,7 @@ class Rim:
         return self._scaled(lambda r: r / math.hypot(r, distance))
 
     def _scaled(self, of_radius: Callable[[float], float]) -> Rim:
-        """Return this rim moved to the origin, with its points at new distances from its middle, by `of_radius`."""
+        """Return this rim, moved to the origin, with each distance r from its middle changed to of_radius(r)."""
         radius = of_radius(self.radius)
         if self.vertices is None:
             return Rim(np.zeros(2), radius)
@@ -178,9 +178,9 @@ def _round(hull: Any) -> tuple[np.ndarray, float, np.ndarray | None, float]:
 
 
 def _circle(corners: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Return the centre of a circle fitted to a hull's corners, the largest distance of a corner from it, and residual.
+    """Return the centre and radius of a circle fitted to the corners of a convex hull, and the residual of the fit.
 
-    The residual of the fit is relative to this distance.
+    The radius is the largest distance of a corner from the centre. The residual is relative to this radius.
 
     Source: Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976.
     """
@@ -191,11 +191,12 @@ def _circle(corners: np.ndarray) -> tuple[np.ndarray, float, float]:
 
 
 def _oval(corners: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return a polygon for an oval that encloses the corners of a hull, and the relative residual of the oval's fit.
+    """Return a polygon that represents an oval around the corners of a convex hull, and the relative residual.
 
-    The polygon has approximately the area of the oval. The oval is an ellipse that is fitted to the corners. Its radius
-    is multiplied by a Fourier series of the angle if this improves the fit much, because the image of a round stop is
-    an ellipse only to first order. The residual is infinite if the best conic is not an ellipse.
+    The oval encloses all corners, and the polygon has approximately the same area as the oval. The oval is an ellipse
+    that is fitted to the corners. Its radius is multiplied by a Fourier series of the angle if this improves the fit
+    much, because the image of a round stop is an ellipse only to first order. The residual is infinite if the best
+    conic is not an ellipse.
     """
     origin = corners.mean(axis=0)
     x, y = (corners - origin).T

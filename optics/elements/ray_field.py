@@ -107,12 +107,13 @@ class RayField(Mask):
         return found if own is None else found * own.amplitude(x, y, radius)
 
     def bandwidth(self, level: float, radius: float) -> float:
-        """Return f [1/m] so that components of this mask's amplitude above the spatial frequency f are below `level`.
+        """Return the spatial frequency [1/m] above which components of this `RayField` are below `level`.
 
-        It is the sum of up to three such frequencies. The first is that of the optical path through the pupil, doubled
-        because the field depends on products of the path's slopes. The second is that of the mask in `beam.pupil`, if
-        there is one. With a lens, the third is that of the ray directions as functions of the distance from the axis:
-        these functions have singularities at the imaginary distances ±i f₀, where f₀ is the focal length.
+        This bandwidth is a sum of up to three terms. The first is twice the bandwidth of the optical path through the
+        pupil, because the field depends on products of the path's slopes. The second is the bandwidth of the mask in
+        `beam.pupil`, if there is one. With a lens, the third is the bandwidth of the ray directions as functions of the
+        distance from the axis. These functions have singularities at the imaginary distances ±i f₀, where f₀ is the
+        focal length.
         """
         pupil, own = self.beam.pupil, self.beam.pupil.mask
         found = SPREAD * self._bare.bandwidth(self.beam.wavelength, level)

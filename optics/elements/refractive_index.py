@@ -51,7 +51,7 @@ class Dispersion(ABC):
         """Return the index at a vacuum wavelength [m], without checking its range."""
 
     def _number(self, wavelength: float, n: Scalar) -> float:
-        """Return the result `n` of `_n` without derivatives."""
+        """Return the refractive index `n`, a result of `_n`, as a plain number without derivatives."""
         return number(n)
 
 
@@ -84,8 +84,8 @@ class RefractiveIndex(Dispersion):
         """Return the Cauchy curve with index n_d at 587.562 nm and the given Abbe number (infinite: no dispersion).
 
         Raises:
-            ValueError: n_d is outside [1, 10], or so is the curve's limit A at long wavelengths, or the Abbe number is
-                not positive.
+            ValueError: n_d or A, the curve's limit at long wavelengths, is outside [1, 10], or the Abbe number is not
+                positive.
         """
         in_range("n_d", n_d, 1.0, 10.0, carried=True)
         number = positive("abbe_number", abbe_number, "1", infinite=True)
@@ -203,7 +203,7 @@ def index_of(name: str, value: Any) -> Dispersion:
     name: name of the argument, for error messages.
 
     Raises:
-        ValueError: the index is neither a number in [1, 10] nor a curve, or carries a derivative.
+        ValueError: value is neither a number in [1, 10] nor a curve, or it carries a derivative.
     """
     if isinstance(value, Dispersion):
         if value.is_differentiable:
@@ -220,12 +220,14 @@ def _constant(n: float) -> RefractiveIndex:
 
 
 def material(name: str, value: Any) -> Dispersion:
-    """Return the dispersion curve for a number or a curve, which may carry derivatives.
+    """Return a dispersion curve: `value` itself, or a constant curve if `value` is a number.
+
+    The value may carry derivatives, which are kept.
 
     name: name of the argument, for error messages.
 
     Raises:
-        ValueError: the index is neither a number in [1, 10] nor a curve.
+        ValueError: value is neither a number in [1, 10] nor a curve.
     """
     if isinstance(value, Dispersion):
         return value

@@ -1,4 +1,4 @@
-"""Reliefs: height maps of the pupil's glass, over the square that holds the pupil.
+"""Reliefs: maps of the height of the glass in a pupil, over the square around the pupil.
 
 A relief is a function of (x, y) in units of the aperture radius. Inside the pupil, x and y lie in [-1, 1]. Rows ascend
 with y, columns with x. `Pupil.path` converts heights to optical paths, and `Beam.waves` converts optical paths to
@@ -49,10 +49,10 @@ class Relief(ABC):
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
-        """Return f [cycles per aperture radius] so that components of the relief above f are below `level` [m]."""
+        """Return the frequency [cycles per aperture radius] above which height components are below `level` [m]."""
 
     def detail(self, level: float) -> float:
-        """Return f [cycles per radius] so that light-scattering detail of the relief above f is below `level` [m]."""
+        """Return the frequency [cycles per radius] above which the detail that scatters light is below `level` [m]."""
         return self.bandwidth(level)
 
     @property
@@ -77,12 +77,12 @@ class Relief(ABC):
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """True if the height and its requested derivatives depend only on the distance from the axis."""
+        """True if the height and the derivatives that it carries depend only on the distance from the axis."""
         return False
 
     @property
     def mirror_symmetric(self) -> bool:
-        """True if mirroring of x or of y changes neither the height nor its requested derivatives."""
+        """True if neither x → -x nor y → -y changes the height or the derivatives that it carries."""
         return self.rotationally_symmetric
 
 
@@ -124,7 +124,7 @@ class BSplineRelief(Relief):
         exp(-ik medium_n r²/2f). n is the index of the relief, medium_n the index behind it, and object_n the index in
         front of it, as in `Pupil`.
 
-        The control values of x² are X_i² - δ²/3. Here X_i = (2i - 3) a are the Greville abscissae, δ = 2a is the
+        The B-spline coefficients of x² are X_i² - δ²/3. Here X_i = (2i - 3) a are the Greville abscissae, δ = 2a is the
         spacing of the uniform knots, and a is the radius.
 
         Raises:
@@ -158,8 +158,8 @@ class BSplineRelief(Relief):
     def rotationally_symmetric(self) -> bool:
         """True for a constant height or a paraboloid on the axis; False if the control points carry derivatives.
 
-        The control points are then c[i, j] = c₀ + c₁ ((2i - 3)² + (2j - 3)²) for i and j from 0 to 3, with two
-        constants c₀ and c₁.
+        The control points of a constant height or of such a paraboloid are c[i, j] = c₀ + c₁ ((2i - 3)² + (2j - 3)²)
+        for i and j from 0 to 3, with two constants c₀ and c₁.
         """
         if is_differentiable(self.control_points):
             return False  # a derivative depends on every control point
@@ -176,10 +176,10 @@ class BSplineRelief(Relief):
 
 @dataclass(frozen=True, eq=False)
 class HeightMap(Relief):
-    """Heights [m] sampled at cell centres over the pupil's square, joined by cubic splines (not-a-knot ends).
+    """Heights [m] sampled at cell centres over the square around the pupil, joined by cubic splines.
 
-    samples: (row, column); rows ascend with y, columns with x. Beyond the outermost centres the spline continues for
-        one cell, then linearly.
+    samples: (row, column); rows ascend with y, columns with x. The splines have not-a-knot ends. They are extrapolated
+        by one cell beyond the outermost centres, and by straight lines farther out.
 
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
@@ -251,9 +251,11 @@ class HeightMap(Relief):
         return band_of(self._heights, level)
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return the result of `Relief.detail` for a square in the middle of the map, in cycles per half side of it.
+        """Return the frequency above which the detail that scatters light is below `level` [m].
 
-        part: half side of this square in units of the radius. Values above 1 count as 1.
+        Only a square in the middle of the map is considered. The unit is one cycle per half the side of this square.
+
+        part: half the side of this square in units of the radius. Values above 1 count as 1.
         """
         return reach_of(_power_beyond(self, min(part, 1.0)), level)
 
@@ -272,6 +274,6 @@ class HeightMap(Relief):
 
 @lru_cache(maxsize=16)
 def _power_beyond(relief: HeightMap, part: float) -> np.ndarray:
-    """Return `fine_detail.power_beyond` of a central square with the half side `part`."""
+    """Return the result of `fine_detail.power_beyond` for the central square of a map; its side is 2 `part` radii."""
     at = ((np.arange(n := math.ceil(part * relief.knots)) + 0.5) * 2 / n - 1) * part
     return power_beyond(relief._heights if part == 1 else relief.on_grid(at))

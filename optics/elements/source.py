@@ -24,7 +24,7 @@ class PointSource:
         focuses parallel light near the point x = f tan θx, y = f tan θy. The focus has the off-axis aberrations of a
         single stigmatic lens.
 
-    These numbers may carry derivatives.
+    The distance and the angles may carry derivatives.
 
     Raises:
         ValueError: the distance is not positive, or an angle is outside [-1.5, 1.5].

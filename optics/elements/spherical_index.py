@@ -1,8 +1,8 @@
 """Rays through a sphere whose refractive index depends on the distance from the centre.
 
 Lengths are relative to the sphere's radius, and indices n relative to the medium. The height h of a ray is the distance
-of the incident ray's straight line from the centre. Along the ray, n r sin i = h is constant, where i is the angle
-between the ray and the radius (Bouguer's theorem). Between entry and exit, the ray turns about the centre by
+between the centre and the straight line of the incident ray. Along the ray, n r sin i = h is constant, where i is the
+angle between the ray and the radius (Bouguer's theorem). Between entry and exit, the ray turns about the centre by
 
     ψ(h) = 2 ∫ h dr / (r √(n² r² - h²)),
 
@@ -49,9 +49,8 @@ class SphericalIndex:
         relative: function that returns n for an array of r/R, the distance from the centre divided by the radius.
 
         Raises:
-            ValueError: light could stay inside the sphere, because n r/R decreases outwards somewhere. A decrease is
-                allowed only where n r/R exceeds 1 or exceeds n(R). These are the values of n r/R just outside and just
-                inside the surface.
+            ValueError: light could stay inside the sphere, because n r/R decreases outwards where it exceeds neither 1
+                nor n(R). The values of n r/R just outside and just inside the surface are 1 and n(R).
         """
         found = cls(Chebyshev.interpolate(lambda t: relative(np.sqrt(np.clip(t, 0, 1))), TERMS - 1, (0.0, 1.0)))
         t = np.linspace(0, 1, 20 * TERMS)
@@ -61,7 +60,9 @@ class SphericalIndex:
         return found
 
     def turning(self, h: np.ndarray) -> np.ndarray:
-        """Return the angle ψ [rad] by which rays turn about the centre, for heights h relative to the radius (array).
+        """Return the angle ψ [rad], seen from the centre, between the points where a ray enters and leaves the sphere.
+
+        h: heights of the rays relative to the radius, an array of any shape. The result has the same shape.
 
         Raises:
             ValueError: a ray is totally reflected at the surface.

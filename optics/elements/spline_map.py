@@ -116,8 +116,8 @@ def _coefficients(samples: np.ndarray) -> np.ndarray:
     """Return the B-spline coefficients c = s - s''/6 of the cubic spline s through samples, along axis 0.
 
     There is one coefficient for each sample, and there are further ones beyond the first and the last sample. At either
-    end, the two coefficients just beyond the samples follow from the same equation, where s is the spline extrapolated
-    beyond its samples. The coefficients farther out lie on the straight line through these two.
+    end, the two coefficients just beyond the samples are s - s''/6 of the extrapolated spline. The coefficients farther
+    out lie on the straight line through these two.
     """
     from scipy.interpolate import make_interp_spline
 

@@ -29,7 +29,7 @@ def with_numbers(element: Any, numbers: Mapping[str, Any]) -> Any:
 
 
 def refuse_torch(beam: Beam) -> None:
-    """Raise a ValueError if a tensor of PyTorch requires a gradient, which Dr.Jit cannot compute."""
+    """Raise a ValueError if a number in `beam` is a PyTorch tensor that requires a gradient, which would be lost."""
     own = {"sensor_distance": beam.distance, "source_distance": beam.source.distance}
     own |= {"source_angle": next(filter(of_torch, beam.source.angle), None)}
     for name in [*torch_numbers(beam.pupil), *(name for name, value in own.items() if of_torch(value))]:

@@ -32,7 +32,7 @@ class Mask(ABC):
 
     @abstractmethod
     def bandwidth(self, level: float, radius: float) -> float:
-        """Return f [1/m] so that components of the mask's amplitude above the spatial frequency f are below `level`.
+        """Return the spatial frequency [1/m] above which components of the mask's amplitude are below `level`.
 
         radius: radius of the pupil [m].
         """
@@ -40,8 +40,8 @@ class Mask(ABC):
     def detail(self, light: float, radius: float) -> float:
         """Return the frequency [1/m] along x and y beyond which the mask scatters at most a given amount of light.
 
-        light: amount of light that may be scattered beyond this frequency, averaged over the disk of the pupil, as a
-            fraction of the incident light.
+        light: amount of light that may be scattered beyond this frequency, as a fraction of the light that falls on the
+            whole disk of the pupil.
         radius: radius of the pupil [m].
         """
         return self.bandwidth(math.sqrt(light), radius)
@@ -98,8 +98,8 @@ class GaussianMask(Mask):
 
         If the waist is w, the fraction exp(-2π²w²f²) of the transmitted light lies beyond f.
 
-        light: amount of light that may be scattered beyond f, averaged over the disk of the pupil, as a fraction of the
-            incident light.
+        light: amount of light that may be scattered beyond f, as a fraction of the light that falls on the whole disk
+            of the pupil.
         radius: radius of the pupil [m].
         """
         waist = number(self.waist)
@@ -119,12 +119,12 @@ class GaussianMask(Mask):
 class MaskMap(Mask):
     """Amplitudes in [-1, 1], sampled at cell centres over the square [-reach, reach]², joined by cubic splines.
 
-    The interpolation is that of HeightMap. For hard edges use apertures instead.
+    HeightMap describes the interpolation. For hard edges use apertures instead.
 
     samples: (row, column); rows ascend with y, columns with x.
     reach: half side [m] of the square, at least the pupil's radius. None: equal to the pupil's radius.
 
-    A Dr.Jit or PyTorch tensor may carry derivatives.
+    The samples may carry derivatives, as a Dr.Jit or PyTorch tensor.
 
     Raises:
         ValueError: the samples are not two-dimensional, are empty or of half precision, or one is not a real number in

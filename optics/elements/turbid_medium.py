@@ -88,15 +88,15 @@ class TurbidMedium:
         """Return the medium in spectral bands.
 
         The coefficient of a band is a mean, weighted by the receptors' quantum catch in daylight. As the distance to a
-        white surface grows from 0, the signal of every receptor therefore changes at the correct rate per metre, if
-        there are at least as many bands as receptor types. At longer distances, the true transmission of a band is not
+        white surface grows from 0, the signal of every receptor therefore changes at the correct rate per metre. This
+        requires at least as many bands as receptor types. At longer distances, the true transmission of a band is not
         an exponential function, and `band_error` returns the error.
 
         bands: the bands of an eye
         receptors: the receptors for which these bands were made
 
         Raises:
-            ValueError: the receptors are unknown.
+            ValueError: receptors is None, an unknown name, or invalid.
         """
         white = daylight(bands.wavelengths)
         c = bands.band_values(_in_daylight(self.attenuation), receptors, nonnegative=True) / white

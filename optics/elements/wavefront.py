@@ -1,7 +1,7 @@
 """Wavefront aberrations of an eye or other optics, added to an ideal lens, in the convention of aberrometers.
 
 A value is positive if the wavefront that leaves the eye is ahead of the ideal wavefront, as in reports on human eyes. A
-myope therefore has a positive defocus. For light that enters the eye, the value is the shortening of its optical path.
+myope therefore has a positive defocus. The optical path of light that enters the eye is shorter by this value.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Aberration(ABC):
 
     radius: radius of the circle or half side of the square [m]. None: equal to the pupil's radius.
 
-    scatters: True if fine detail may scatter light into directions that do not follow from the slopes.
+    scatters: True if fine detail may scatter light away from the rays, the normals of the wavefront.
     """
 
     scatters: ClassVar[bool] = True
@@ -41,16 +41,16 @@ class Aberration(ABC):
 
     @abstractmethod
     def ahead(self, x: Array, y: Array) -> Array:
-        """Return the aberration [m] at x and y in units of the radius; x, y: arrays as in `Relief.height`."""
+        """Return the aberration [m] at (x, y), in units of its radius; x and y are arrays as in `Relief.height`."""
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
-        """Return f [cycles per radius] so that components of the wavefront above f are smaller than `level` [m]."""
+        """Return the frequency [cycles per radius] above which the wavefront's components are below `level` [m]."""
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return the frequency [cycles per radius] along x and y above which fine detail is below `level` [m] rms.
+        """Return the frequency [cycles per radius] above which the wavefront's detail has an rms below `level` [m].
 
-        Fine detail scatters light away from the rays that follow from the wavefront's slopes.
+        The frequency is along x and y. Fine detail scatters light away from the rays, the normals of the wavefront.
 
         part: radius of the pupil divided by that of the wavefront.
         """
@@ -59,16 +59,16 @@ class Aberration(ABC):
     @property
     @abstractmethod
     def knots(self) -> int:
-        """Number of polynomial pieces across the wavefront, which the grid for `Pupil.slopes` must resolve."""
+        """Number of polynomial pieces across the wavefront. The grid for `Pupil.slopes` must resolve these pieces."""
 
     @property
     @abstractmethod
     def span(self) -> float:
-        """Largest minus smallest value [m], or an upper bound on this difference."""
+        """Largest minus smallest value of the wavefront [m], or an upper bound on this difference."""
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """True if the wavefront and its requested derivatives depend only on the distance from the axis."""
+        """True if the wavefront and the derivatives that it carries depend only on the distance from the axis."""
         return False
 
     def _check_radius(self) -> None:
@@ -122,7 +122,7 @@ class Zernike(Aberration):
         coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
         radius: radius [m] of the circle. None: the pupil's radius.
 
-        Noll's polynomials have the normalisation of OSA, a variance of 1. They are used in astronomy and by poppy.
+        Noll's polynomials, used in astronomy and by poppy, have the normalisation of OSA, a variance of 1.
         A row that is a Dr.Jit array is not accepted.
 
         Raises:
@@ -132,13 +132,13 @@ class Zernike(Aberration):
 
     @classmethod
     def from_fringe(cls, coefficients_um: Any, radius: float | None = None) -> Zernike:
-        """Return the wavefront whose coefficients have Fringe numbers.
+        """Return the wavefront whose coefficients are given by their Fringe numbers.
 
         coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
         radius: radius [m] of the circle. None: the pupil's radius.
 
-        Fringe polynomials, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ, have the amplitude 1 at the rim. The
-        result has their coefficients divided by √((2 - δ_m0)(n + 1)), as the normalisation of `Zernike` requires. Many
+        Fringe polynomials, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ, have the amplitude 1 at the rim. Each
+        coefficient is divided by √((2 - δ_m0)(n + 1)), as the normalisation of `Zernike` requires. Many
         interferometers and lens design programs use Fringe polynomials. A row that is a Dr.Jit array is not accepted.
 
         Raises:
@@ -193,7 +193,8 @@ class Zernike(Aberration):
     def detail(self, level: float, part: float = 1.0) -> float:
         """Return 0, because a Zernike polynomial has no fine detail that scatters light away from the rays.
 
-        It has only n/2 cycles across the circle. Rays reach higher frequencies, as slopes at the rim grow with n².
+        A polynomial of order n has only n/2 cycles across the circle. Its slopes, which grow with n² at the rim,
+        deflect light farther than these cycles would scatter it.
         """
         return 0.0
 

@@ -1,7 +1,7 @@
 """Local slopes of the wavefront behind a pupil.
 
-They give the directions of rays, and the combined gradient of the pupil's phase and of the path to a point of the
-window. The window is the part of the sensor plane in which light is computed.
+The slopes give the directions of rays. They also give the gradient of the whole optical path from the source through a
+point of the pupil to a point of the window. The window is the part of the sensor plane in which light is computed.
 """
 
 from __future__ import annotations
@@ -148,8 +148,8 @@ class Slopes(ReadOnlyArrays):
     def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the coordinates x and y [m] at which rays from the pupil's disk hit a plane at `distance` [m].
 
-        There is one ray for each sample of the grid in the disk. For an evanescent ray, x is infinite, or NaN if
-        the slope along x is 0, and the same holds for y.
+        There is one ray for each grid point within the disk. For an evanescent ray, x is infinite, or NaN if the slope
+        along x is 0, and the same holds for y.
 
         medium_n: refractive index behind the pupil.
         """

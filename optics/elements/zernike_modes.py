@@ -67,9 +67,10 @@ def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: np.ndarr
 def _modes(
     named: tuple[tuple[int, int], ...], x: bytes, columns: tuple[int, ...], y: bytes, rows: tuple[int, ...]
 ) -> np.ndarray:
-    """Return the polynomials at (x, y), (mode, point).
+    """Return the Zernike polynomials of the modes (n, m) in `named` at points (x, y), array (mode, point).
 
-    x, y: memory of float64 arrays with the shapes `columns` and `rows`.
+    x, y: positions in units of the circle's radius, as the bytes of float64 arrays.
+    columns, rows: shapes of the arrays x and y.
     """
     at = np.frombuffer(x).reshape(columns), np.frombuffer(y).reshape(rows)
     size = np.broadcast_shapes(columns, rows)

@@ -46,10 +46,11 @@ def noll_mode(j: int) -> Mode:
 
 
 def fringe_mode(j: int) -> Mode:
-    """Return the mode with the number j of the Fringe set of the University of Arizona, from 1 on.
+    """Return the Zernike mode (n, m) that has the number j, from 1 on, in the Fringe set of the University of Arizona.
 
-    Modes with equal n + |m| form a group, in which |m| decreases. Each cosine mode precedes its sine mode. Source:
-    J. Loomis, FRINGE user's manual, University of Arizona (1976).
+    Modes with equal sums of the radial order n and the absolute azimuthal order |m| form a group, in which |m|
+    decreases. Each cosine mode precedes its sine mode. Source: J. Loomis, FRINGE user's manual, University of Arizona
+    (1976).
 
     Raises:
         ValueError: j is not a whole number from 1 to 36.

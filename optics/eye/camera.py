@@ -41,8 +41,8 @@ class Sensor:
     photon_budget: illuminance of the scene, exposure time, and quantum efficiency at the filters' peaks.
     full_well: number of electrons at which a pixel saturates.
     read_noise: standard deviation [electrons] of the noise of reading a pixel.
-    bits: bits of a digital number, 1 to 16. A pixel with `full_well` electrons has the largest number. None: the result
-        is the number of electrons, which is not rounded.
+    bits: bits of a digital number, 1 to 16. A pixel with `full_well` electrons has the largest number. If `bits` is
+        None, the result is the number of electrons, which is not rounded.
     bands: number of spectral bands of the scene, 1 to 64.
 
     Raises:
@@ -88,18 +88,21 @@ def camera_image(
 
     A camera is a pupil with a sensor behind it. The image of an eye consists of the signals of its receptors.
 
-    Light is blurred by the PSF of its distance and wavelength, and near surfaces hide far ones (see `Eye.see`). The
-    blurred light is integrated over pixels and weighted by the filters. Electrons are counted with shot noise, up to
-    the full well. Read noise is added, and the sum is rounded to digital numbers.
+    Light is blurred by the PSF for its wavelength and for the distance of the surface that it comes from. Near surfaces
+    hide far ones (see `Eye.see`). The blurred light is integrated over each pixel and weighted by the sensitivity of
+    the pixel's colour filter. Electrons are counted with shot noise, up to the full well. Read noise is added, and the
+    sum is rounded to digital numbers.
 
-    scene: sRGB image (Y, X, 3) with values in [0, 1], as in image files, or radiance (band, Y, X). The radiance is
-        relative to a white surface, in the bands of `camera_eye(lens, sensor).spectral_bands`. An sRGB image becomes
-        reflectances in daylight (`srgb_basis`). The scene has samples_per_pixel² cells for each pixel, and may exceed
-        the sensor by an even number of cells along each axis. It is upright: row 0 is the top, column 0 the left.
+    scene: sRGB image (Y, X, 3) with values in [0, 1], as in image files, or radiance (band, Y, X). Radiance is
+        given for the bands `camera_eye(lens, sensor).spectral_bands`, and is 1 for a white surface. An sRGB image
+        becomes reflectances in daylight (`srgb_basis`). Each entry (Y, X) is a cell of the scene. A pixel corresponds
+        to samples_per_pixel² cells. The scene may be larger than the sensor, by an even number of cells along each
+        axis. It is upright: row 0 is the top, column 0 the left.
     lens: a pupil, or an eye, which has its own receptors and noise.
     sensor: the sensor behind a pupil; None for an eye.
     depth: distance [m] of the scene along the axis: a number, or a map with one distance per cell (Y, X).
-    samples_per_pixel: cells of the scene per pixel along each axis. Defocused edges need more than one.
+    samples_per_pixel: cells of the scene per pixel along each axis. Accurate images of defocused edges require more
+        than one cell per pixel.
     field_zones: number of PSFs along the longer side of the field, or "auto", see `Eye.sight`. 1: the PSF in the middle
         of the field is used everywhere.
     rng: random generator of the noise. None: no noise, and the mean number of electrons.
@@ -136,8 +139,8 @@ def camera_eye(
 ) -> Eye:
     """Return the eye that a pupil and a sensor form: its receptors are the pixels, and its only noise is shot noise.
 
-    Its kernels, PSFs and spectral bands are those of the camera. The arguments are those of `camera_image`, except that
-    `lens` must be a pupil, and `sensor` must not be None.
+    This eye has the kernels, PSFs and spectral bands with which `camera_image` computes images. The arguments are those
+    of `camera_image`, except that `lens` must be a pupil, and `sensor` must not be None.
 
     Raises:
         ValueError: an argument is invalid, sensor_distance carries a derivative, or the lens forms no real image of
@@ -154,7 +157,10 @@ def camera_eye(
 
 @lru_cache(maxsize=4)
 def _camera_eye(pupil: Pupil, sensor: Sensor, distance: float, tolerance: float) -> Eye:
-    """Return the eye of a camera. Recent eyes are cached, because they contain their kernels."""
+    """Return the eye that a pupil and a sensor form.
+
+    Recent eyes are cached, because each eye stores the kernels of its last image, which take long to compute.
+    """
     width = sensor.pixels[1] * sensor.pitch
     focal = distance / number(behind_pupil(pupil, 1.0))
     return Eye(
@@ -215,10 +221,10 @@ def _distances(depth: Any, shape: tuple[int, ...]) -> Any:
 
 
 def _read(signals: np.ndarray | Array, sensor: Sensor, eye: Eye, rng: np.random.Generator | None) -> np.ndarray | Array:
-    """Return electrons or digital numbers for the signals of pixels.
+    """Return the digital numbers for the signals of pixels, or the numbers of electrons if `sensor.bits` is None.
 
     Raises:
-        ValueError: the signals carry derivatives, and `bits` is not None.
+        ValueError: the signals carry derivatives, and `sensor.bits` is not None.
     """
     per_signal = eye.receptor_photons
     assert per_signal is not None

@@ -30,11 +30,12 @@ FEWER = ((2.0, 1e-2, 0.5), (1.0, 1e-3, 0.25))
 
 
 def samples_per_cycle(tolerance: float, cycles: float = 0.0) -> float:
-    """Return how finely an image must be sampled for accurate integrals of it over the cells of a retina.
+    """Return the number of samples of an image that are required per cycle of its highest spatial frequency.
 
-    The result is the number of samples per cycle of the image's highest spatial frequency. The error of the integrals
-    is then within a third of the tolerance. Cells are the equal rectangles into which the retina is divided.
+    The integrals of the image over the cells of a retina are then accurate. Cells are the equal rectangles into which
+    the retina is divided.
 
+    tolerance: three times the error of the integrals, relative to their root mean square.
     cycles: width of a cell, in cycles of the highest frequency.
     """
     if tolerance <= FINE_TOLERANCE:
@@ -60,9 +61,9 @@ class Tiles:
 
 @lru_cache(maxsize=16)
 def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
-    """Return a matrix (cell, sample) that maps samples of a PSF along one axis to its integrals over a row of cells.
+    """Return a matrix (cell, sample) that maps samples of a PSF along one axis to the PSF's integrals over cells.
 
-    The integrand is the spline through the samples. The row of cells is centred on the middle sample.
+    The integrand is the spline through the samples. The cells form a row that is centred on the middle sample.
 
     If tiles.from_cell is True, the source of the light is an area of the scene whose geometric image is as large as a
     cell. The integrals are then averaged over the points of this area. The PSF is thus convolved twice with the width
@@ -99,10 +100,10 @@ def _knots(x: np.ndarray, degree: int) -> np.ndarray:
 
 
 def _over_samples(integrals: np.ndarray, degree: int) -> np.ndarray:
-    """Return the matrix Q C⁻¹, which maps the samples of a function to the function's integrals over cells.
+    """Return the matrix Q C⁻¹ (cell, sample), which maps samples to the integrals of the spline through them.
 
-    Cells are the equal rectangles into which the retina is divided. The function is the spline through the samples, a
-    sum of B-splines. C contains the values of the B-splines at the samples. The shape of Q C⁻¹ is (cell, sample).
+    Each integral is over one cell. Cells are the equal rectangles into which the retina is divided. The spline is a sum
+    of B-splines. C contains the values of the B-splines at the samples.
 
     integrals: Q, the integrals of the B-splines over the cells, array (cell, B-spline).
     """
@@ -135,8 +136,8 @@ def _collocation(samples: int, degree: int) -> tuple[int, int, np.ndarray]:
 def _primitive(knots: np.ndarray, degree: int, at: np.ndarray, times: int) -> np.ndarray:
     """Return single or double integrals of B-splines from the first knot to each position, (position, B-spline).
 
-    The integral of B_j is the sum of the B-splines of the next degree with index j or higher, times the width of B_j
-    divided by its degree plus 1 (de Boor, A Practical Guide to Splines, ch. X).
+    The integral of B_j, a B-spline of degree k and width w, is w/(k + 1) times a sum. The sum is that of all B-splines
+    of degree k + 1 with index j or higher (de Boor, A Practical Guide to Splines, ch. X).
     """
     knots = np.concatenate([knots[:1]] * times + [knots] + [knots[-1:]] * times)
     found: np.ndarray = _bsplines(knots, degree + times, at).toarray()

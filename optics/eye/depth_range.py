@@ -66,9 +66,9 @@ class DepthRange:
 
 
 def layers_for(z: Any) -> tuple[str, tuple[float, ...]]:
-    """Return the `depth_layers` that `Eye.see` uses for a scene, and the distances [m] on which its kernels depend.
+    """Return the `depth_layers` that `Eye.see` uses for a scene, and the distances [m] that determine the kernels.
 
-    The layers are "distinct" or "auto". With "auto", the distances are the farthest and the nearest.
+    `depth_layers` is "distinct" or "auto". With "auto", the distances are the farthest and the nearest.
 
     z: distances [m] in the scene, a number or an array.
     """

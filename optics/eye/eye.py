@@ -48,7 +48,7 @@ class Eye(EyeSpec):
     fov_deg: horizontal field of view in front of the eye, in [1e-3, 170]. The retina lies at f = L / (2 tan(fov/2))
         behind the pupil. If the indices n behind and n₀ in front of the pupil differ, it lies at f n/n₀.
     sensor_width: L, width [m] of the retina or of the modelled patch of it.
-    full_aperture: diameter [m] of a pupil with a throughput of 1 (None: L).
+    full_aperture: diameter [m] of the eye's widest pupil, whose throughput is 1 by definition (None: L).
     eccentricity_deg: (right, up), viewing direction of the middle of the patch in the visual field.
     bands: number of spectral bands, 1 to 64. "auto": the smallest power of two, up to 32, for which the predicted error
         of a receptor's signal is within the tolerance. The choice requires PSFs at many wavelengths. It is worthwhile
@@ -67,15 +67,15 @@ class Eye(EyeSpec):
     pupil_turned: True if the pupil is rotated by 180° about the axis. The axes of `psf` are then those of the pupil.
     vertical_fov_deg: vertical field of view [degrees], 0.001 to 170, which determines the height of the receptors.
         None: receptors are square, and the height of the retina follows from the number of rows.
-    most_seconds: largest predicted time [s] of the PSF of a band. Pupils that need more are refused.
+    most_seconds: longest predicted time [s] that the PSF of a band may take. Pupils that need more are refused.
     dynamics: time course of the receptors' responses. Only environments use it. The methods of `Eye` return the signals
         for constant light. None: receptors respond without delay.
     density: receptors per area of the retina, up to a constant factor. It is a function of the angles (right, up)
         [degrees] from the eye's axis (a `Fovea` or `VisualStreak`), an array (row, column) over the whole field, from
         its top left, or the `lattice` of an eye. Receptors are rectangles in rows. A signal is the mean over a
         receptor, and large receptors have less shot noise (None: all receptors are alike).
-    tolerance: relative L2 error of the PSF. It is also the largest error that each automatic choice may cause in a
-        receptor's signal, relative to the signal that a white surface gives.
+    tolerance: relative L2 error of the PSF. It is also the largest error that each automatic choice, of bands or of
+        kernels, may cause in a receptor's signal, relative to the signal that a white surface gives.
     dtype: "float32" or "float64", the type of PSF, kernel and signals.
 
     The pupil (see `Pupil`), fov_deg and distances z may contain Dr.Jit arrays that carry derivatives. Results that
@@ -90,7 +90,7 @@ class Eye(EyeSpec):
     def white_signal(self) -> Scalar:
         """Signal of a receptor that sees white everywhere, averaged over receptor types.
 
-        It is `throughput`. With waveguides, it is the fraction of the widest pupil's light that these absorb.
+        It is `throughput`. With waveguides, it is the light that they absorb, divided by that on the widest pupil.
         """
         if self.waveguide is None:
             return self.throughput
@@ -101,9 +101,9 @@ class Eye(EyeSpec):
         return white_share(plain(self.kernel(1)), self.spectral_bands)
 
     def psf(self, z: Scalar = math.inf) -> PSFResult:
-        """Return the PSF on the retina for a point at the distance z [m] along the axis.
+        """Return the PSF on the retina for a point in direction `eccentricity_deg`.
 
-        This point lies in direction `eccentricity_deg`, so its image is at the retina's middle. The window loses less
+        The point's distance along the axis is z [m]. Its image is at the retina's middle. The PSF's window loses less
         than the fraction `tolerance` of light (exceptions: see `kernel`). A perfect lens has one sample with all power.
 
         Raises:
@@ -120,22 +120,22 @@ class Eye(EyeSpec):
     ) -> np.ndarray | Array:
         """Return the receptive kernel (band, ky, kx) in the orientation of the visual field.
 
-        It is the PSF, integrated over cells; ky and kx are odd. A receptor has samples_per_receptor² equal cells.
+        It is the PSF, integrated over cells, the samples_per_receptor² equal parts of a receptor; ky and kx are odd.
 
         z: distance [m] of the scene along the axis, positive or infinite.
         direction_deg: angles (right, up) from the axis to a point source, -80 to 80 (None: `eccentricity_deg`). The
             kernel's centre cell lies around the geometric image of this source.
 
-        The kernel extends over a window. Its sum is the fraction of the pupil's power that lands in it. The window is
-        wide enough to lose less than the tolerance, except for light at more than 50° from the receptor's direction.
-        Light that a steep pupil relief sends farther from the image than a side of the retina may count as blocked. A
-        perfect lens has the kernel 1, a single cell. The kernel treats the light of each scene cell as coming from its
-        centre. Signals are then `aperture_throughput` Σ_b `spectral_bands.weights[c, b]` (kernel_b ⊗ radiance_b),
-        averaged over each receptor's cells. By default, `see` assumes light from everywhere in a cell (see `sight`).
+        The kernel's sum is the fraction of the pupil's power that lands in its window. The window loses less than the
+        fraction `tolerance` of it, except for light at more than 50° from the receptor's direction. Light that a steep
+        pupil relief deflects by more than the retina's side may count as blocked. A perfect lens has the kernel 1, a
+        single cell. A cell of the scene is imaged on a receptor's cell. The kernel is for light from its centre, but by
+        default, `see` assumes light from all its points (see `sight`). Signals are then `aperture_throughput` Σ_b
+        `spectral_bands.weights[c, b]` (kernel_b ⊗ radiance_b), averaged over each receptor's cells.
 
         With waveguides, the kernel is the fraction of light that a receptor accepts from each cell of the scene near
         its direction, averaged over the cell. Signals are not averaged over the receptor. ky and kx are even if
-        samples_per_receptor is even. The sum would be 1 for receptors that absorb all light, without a mask.
+        samples_per_receptor is even. If receptors absorbed all light, without a mask in the pupil, the sum would be 1.
 
         Raises:
             ValueError: an argument is invalid, a waveguide has no mode, or waveguides are combined with derivatives.
@@ -171,24 +171,24 @@ class Eye(EyeSpec):
     ) -> KernelBank:
         """Return the kernels for a scene with a range of distances and directions.
 
-        When it is printed, the result shows the chosen numbers of kernels with reasons.
+        The result, if printed, shows the chosen numbers of kernels with reasons.
 
-        z: distances [m] in the scene, a number or an array. Only the nearest and the farthest distance matter, except
-            for "distinct" layers.
+        z: distances [m] in the scene, a number or an array. Only the nearest and the farthest distance matter, unless
+            depth_layers="distinct".
         depth_layers: number of kernels between the nearest and the farthest distance, evenly spaced in 1/z. "auto": the
             first of 1, 3, 5, 9, 17 and 33 that meets the tolerance. "distinct": one kernel for each different distance
             in z, at most 64.
         field_zones: number of kernels along the longer side of the field, or "auto" for the first of 1, 3, 5 and 9 that
-            meets the tolerance. With 1, the kernel in the middle of the field is used for the whole retina.
+            meets the tolerance. 1: the kernel in the middle of the field is used for the whole retina.
         tolerance: largest error of a receptor's signal, relative to the signal of a white surface, in all scenes that
             are nowhere brighter than white (None: the eye's tolerance).
-        light_from: "cells" is exact for images whose radiance is constant within each cell. "centres" treats all light
+        light_from: "cells" is exact if radiance is constant within each cell of the scene. "centres" treats all light
             of a cell as coming from its centre. It suits cells whose radiance is the mean of finer detail, as in
-            rendered images. The error of "cells", O(samples_per_receptor^-2), is then more than twice as large.
+            rendered images. For them, the error of "cells", O(samples_per_receptor^-2), is more than twice as large.
 
         Raises:
             ValueError: an argument is outside its valid range, which the message states.
-            AccuracyError: see `optics.psf`, or the tolerance requires more kernels than the limit.
+            AccuracyError: see `optics.psf`, or the tolerance requires more kernels than the maximum of "auto".
         """
         within = self.tolerance if tolerance is None else in_range("tolerance", tolerance, 1e-6, 0.5)
         s = whole("samples_per_receptor", samples_per_receptor, 1, 64)
@@ -223,14 +223,14 @@ class Eye(EyeSpec):
         The signals that renderers compute are compared with the result of this method.
 
         radiance: radiance (band, Y, X) of the scene's cells. Each receptor is divided into s x s equal cells, with s =
-            samples_per_receptor. Radiance is constant within each cell (for the alternative, see `light_from` of
-            `Eye.sight`). The scene is centred on the field, and dark outside. It has at least h s x w s cells. A larger
-            scene must exceed this height and this width by even numbers.
+            samples_per_receptor. Radiance is constant within a cell, unless `sight` has light_from="centres". The scene
+            is centred on the field, and dark outside. It has at least h s x w s cells. A larger scene must exceed this
+            height and this width by even numbers.
         rng: random generator of the noise; None for signals without noise. Noise carries no derivative.
         z: distance [m] of the scene along the axis, a number or a map with one per cell (Y, X). In a map, near surfaces
-            hide far ones at jumps of depth (see `optics.eye.occlusion`). A hidden part of a far surface looks like the
-            visible cell of this surface that is nearest to the hidden part. Up to 17 different distances have one
-            kernel each. If there are more, distances share kernels within the tolerance.
+            hide far ones at jumps of depth (see `optics.eye.occlusion`). A hidden cell of a far surface is replaced by
+            the nearest visible cell of this surface. Up to 17 different distances have one kernel each. If there are
+            more, kernels are interpolated between fewer distances, within the eye's tolerance.
         sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. An object beyond the
             kernels' range of distances is rendered with the kernel at the end of this range. The kernels of the last
             call are cached. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
@@ -288,8 +288,8 @@ class Eye(EyeSpec):
         """Return a table of the eye's limits: see `summary.Description`.
 
         z: distance [m] of the scene.
-        direction_deg: direction (right, up) [degrees] from the eye's axis, of the receptor that the table describes.
-            None: the middle of the field.
+        direction_deg: angles (right, up) [degrees] from the eye's axis. The table describes the receptor that faces in
+            this direction. None: the middle of the field.
 
         Raises:
             ValueError: the direction is outside the field, or z is not positive.

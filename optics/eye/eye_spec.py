@@ -133,7 +133,7 @@ class EyeSpec:
 
     @property
     def widest_pupil(self) -> float:
-        """Diameter [m] of a pupil with a throughput of 1."""
+        """Diameter [m] of the widest pupil, whose throughput is 1 by definition: `full_aperture` or `sensor_width`."""
         return self.sensor_width if self.full_aperture is None else self.full_aperture
 
     @property
@@ -154,7 +154,7 @@ class EyeSpec:
 
     @property
     def lattice(self) -> ReceptorLattice | None:
-        """Rectangles of the receptors, in units of `receptor_size`; None if no `density` is given."""
+        """Rectangle that each receptor occupies, in units of `receptor_size`; None if `density` is None."""
         if self.density is None or isinstance(self.density, ReceptorLattice):
             return self.density
         (width, height), middle = self._on_tangent_plane
@@ -165,7 +165,8 @@ class EyeSpec:
     def receptor_angles_deg(self) -> np.ndarray:
         """Angles [degrees] that each receptor subtends vertically and horizontally, (2, h, w).
 
-        `optics.sampling_acuity(angle, "square")` is the finest grating [cycles/degree] that such receptors resolve.
+        For one of these angles, `optics.sampling_acuity(angle, "square")` is the finest grating [cycles/degree] that
+        neighbouring receptors with this angle resolve.
         """
         return self._every_receptor.angles_deg(*self._on_tangent_plane)
 
@@ -204,7 +205,10 @@ class EyeSpec:
 
     @property
     def fovy_deg(self) -> float:
-        """Vertical field of view [degrees]: `vertical_fov_deg` or, if that is None, the field of square receptors."""
+        """Vertical field of view [degrees].
+
+        It is `vertical_fov_deg` or, if that is None, the angle that results if receptors are square.
+        """
         height, _ = self.receptor_size
         return math.degrees(2 * math.atan(self.resolution[0] * height / (2 * number(self.sensor_distance))))
 
@@ -232,10 +236,10 @@ class EyeSpec:
 
     @property
     def parallax(self) -> float:
-        """Parallax between views from opposite edges of the pupil, per difference of 1/distance [1/m].
+        """Shift of a near point relative to a far one between views from opposite edges of the pupil.
 
-        The parallax is the shift of a near point relative to a far one, in units of the shorter side of an average
-        receptor. It is divided by the difference of the points' 1/distance. For the perfect lens, it is 0.
+        The shift is in units of the shorter side of an average receptor. It is divided by the difference of the two
+        points' 1/distance [1/m]. For the perfect lens, it is 0.
         """
         if self.pupil is None:
             return 0.0

@@ -60,7 +60,7 @@ def behind_pupil(pupil: Pupil | None, focal: Scalar) -> Scalar:
 
 
 def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) -> None:
-    """Raise a ValueError for a pupil that is not a Pupil, or is wider than `full_aperture` [m]; None is valid.
+    """Raise a ValueError unless `pupil` is None, or a Pupil that is at most as wide as `full_aperture` [m].
 
     width: width [m] of the retina. If `full_aperture` is None, the pupil must not be wider than this width.
     """

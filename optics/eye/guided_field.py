@@ -46,8 +46,8 @@ class Guide:
 
     focal: focal length f [m]. A receptor at the distance x from the axis sees an angle with the tangent x/f.
     cells: number of cells along a receptor's side. Cells are the equal rectangles into which a receptor's area on the
-        retina is divided. A cell of the scene is the part of the scene whose geometric image is one of them.
-    from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
+        retina is divided. A cell of the scene is a part of the scene whose geometric image is one of these rectangles.
+    from_cell: True if light comes from every point of a cell of the scene, False if it comes from the cell's centre.
     """
 
     waveguide: Waveguide
@@ -103,13 +103,14 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
-    """Return integrals over cells of the scene of E, the fraction of a source's light that a waveguide absorbs.
+    """Return the integral of E over each cell of the scene, array (row, column).
 
-    E depends on the source's direction. The cells, equal rectangles in the scene, form a window of directions around
+    E is the fraction of a source's light on the pupil that a waveguide absorbs. It depends on the source's direction.
+    The cells, equal rectangles in the scene, form a window of directions around
     the receptor's direction. The window is widened until the integral of E outside it is at most the fraction
     `retina.tolerance` of the integral over all directions. The half width of the window is at most `spot.half` plus the
     radius of the waveguide's modes. Directions are measured as tangents of angles, so each integral is in units of a
-    squared tangent. The result is an array (row, column), with one integral for each cell.
+    squared tangent.
 
     pitch: distance [m] between samples of the PSF on the retina.
     """
@@ -131,11 +132,13 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
 
 @dataclass(frozen=True)
 class _Cells:
-    """A row of cells, the equal rectangles into which the scene is divided. Lengths are tangents of angles.
+    """A row of cells, the equal rectangles into which the scene is divided.
+
+    Directions are measured as tangents of angles, so `side` and `pitch` are differences of tangents.
 
     count: number of cells.
     side: side of a cell along the row.
-    pitch: distance between samples of a receptor's field, small enough to resolve the field.
+    pitch: distance between directions at which a receptor's sensitivity is sampled, small enough to resolve it.
     """
 
     count: int
@@ -144,11 +147,12 @@ class _Cells:
     tolerance: float
 
     def places(self, from_cell: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return quadrature nodes in every cell of the row, (cell, node), and the weights of the nodes, (node,).
+        """Return quadrature nodes (cell, node) in every cell of this row of cells, and the nodes' weights (node,).
 
         Cells are the equal rectangles into which the scene is divided. A node is a direction at which a receptor's
-        field is evaluated, so that the field can be integrated over each cell. It is given as the tangent of an angle,
-        minus the tangent of the direction of the row's middle. The weights sum to a cell's side.
+        sensitivity is evaluated, so that it can be integrated over each cell. The node's value is the tangent of this
+        direction's angle from the axis, minus the same tangent for the middle of the row. The weights sum to a cell's
+        side.
 
         from_cell: False for a single point in the centre of each cell.
         """
@@ -181,10 +185,11 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
 
 
 def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
-    """Return integrals of E over cells, (row, column), and their share of E's integral over all directions.
+    """Return the integral of E over each cell of the scene, (row, column), and the fraction of E within the cells.
 
-    E is the accepted fraction of a source's light. Directions are measured as tangents of angles, so each integral is
-    in units of a squared tangent.
+    E is the fraction of a source's light on the pupil that the waveguide absorbs, a function of the source's direction.
+    The second value is E's integral over the window of all cells, divided by E's integral over all directions.
+    Directions are measured as tangents of angles, so the integral over a cell is in units of a squared tangent.
     """
     from scipy.ndimage import map_coordinates
 

@@ -18,10 +18,10 @@ def immersed(eye: Any, medium: TurbidMedium | None) -> Any:
     """Return an eye that is immersed in a medium.
 
     The medium is in front of the pupil (`Pupil.object_n`). A refracting surface between air and the eye, such as a
-    cornea, therefore loses power. The retina and its receptors do not move, so tan(fov/2) is divided by the ratio of
-    the new to the former index in front of the pupil, at 550 nm. A pupil without `object_n` has the same medium on both
-    sides. The medium then also fills the eye, and the field of view does not change. A perfect lens is perfect in every
-    medium. Air and fog have no effect.
+    cornea, therefore loses power. The retina and its receptors do not move, so the field of view changes: tan(fov/2) is
+    multiplied by n/n', where n is the former index in front of the pupil and n' the index of the medium, both at 550
+    nm. A pupil without `object_n` has the same medium on both sides. The medium then also fills the eye, and the field
+    of view does not change. A perfect lens is perfect in every medium. Air and fog have no effect.
 
     eye: an `optics.Eye`
     medium: the medium in front of the pupil; None: air
@@ -50,5 +50,5 @@ def immersed(eye: Any, medium: TurbidMedium | None) -> Any:
 
 
 def _narrower(fov_deg: float, ratio: float) -> float:
-    """Return the field of view of a retina at a focal length that is longer by this ratio [degrees]."""
+    """Return the field of view [degrees] that a retina has after its focal length is multiplied by `ratio`."""
     return math.degrees(2 * math.atan(math.tan(math.radians(fov_deg) / 2) / ratio))

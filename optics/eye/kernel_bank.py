@@ -2,8 +2,8 @@
 
 A kernel, the receptive field of a receptor, depends on the position of the light source. Kernels are computed for a few
 positions, the nodes, and interpolated linearly between them (see `kernel_interpolation`). The nodes are evenly spaced
-over the tangent plane. Along depth, they are evenly spaced in inverse distance 1/z, because defocus is linear in 1/z,
-or there is a node at each distance that occurs in the scene. The scene is divided into cells, one or more per receptor
+over the tangent plane. Along depth, there is either a node at each distance z that occurs in the scene, or nodes are
+evenly spaced in 1/z, because defocus is linear in 1/z. The scene is divided into cells, one or more per receptor
 along each axis. The signal is then
 
     signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene,
@@ -38,18 +38,20 @@ DEPTH_COUNTS, FIELD_COUNTS = (1, 3, 5, 9, 17, 33), (1, 3, 5, 9)
 
 @dataclass(frozen=True)
 class KernelBank:
-    """The kernels of an eye at a few positions of the light source, the nodes, between which they are interpolated.
+    """The kernels of an eye for light sources at a few positions, the nodes.
 
-    Cells are the equal rectangles into which the scene and the retina are divided, one or more per receptor.
+    For other positions, the kernels are interpolated. Cells are the equal rectangles into which the scene and the
+    retina are divided, one or more per receptor.
 
     inverse_distances: 1/z [1/m] of the nodes along depth, ascending.
     field: half height and half width of the retina, as numbers of cells.
     kernels: a Dr.Jit tensor (band, ky, kx) for each node (layer, row, column).
     choices: numbers of nodes along depth and over the field, with the reasons for these numbers.
     averaged: True if a receptor's signal is the mean over its cells. It is False with waveguides.
-    parallax: shift [cells] of a near point relative to a far one between views from opposite edges of the pupil,
-        divided by the difference of the points' 1/distance [1/m]. It determines where near surfaces hide far ones. 0:
-        surfaces are hidden only as seen from the middle of the pupil, as in renderers whose rays all pass this point.
+    parallax: factor p [cells m] in the shift p (1/z₁ - 1/z₂) of a near point relative to a far one, between views from
+        opposite edges of the pupil. z₁ and z₂ are the distances [m] of the near and the far point. The shift determines
+        where near surfaces hide far ones. 0: surfaces are hidden only as seen from the middle of the pupil, as in
+        renderers whose rays all pass this point.
     """
 
     inverse_distances: tuple[float, ...]
@@ -77,11 +79,11 @@ class KernelBank:
         return [by_depth[i] * by_row[j][:, None] * by_column[k] for i, j, k in self.kernels]
 
     def check(self, shape: tuple[int, int], bands: int, *, averaged: bool) -> None:
-        """Raise a ValueError unless the kernels were made for this retina.
+        """Raise a ValueError unless the kernels were made for a retina with these properties.
 
-        shape: number of the retina's cells (height, width).
+        shape: numbers (height, width) of cells, the equal rectangles into which the retina is divided.
         bands: number of spectral bands.
-        averaged: True if a receptor's signal is the mean over its cells.
+        averaged: True if a receptor's signal is the mean over the cells into which its area is divided.
         """
         if (shape[0] / 2, shape[1] / 2) != self.field:
             made = " x ".join(f"{2 * half:g}" for half in self.field)
@@ -158,7 +160,7 @@ def prepare(
 def _choices(
     stages: tuple[NodeChoice, NodeChoice], asked: tuple[Choice | None, Choice | None], tolerance: float
 ) -> tuple[Choice, Choice]:
-    """Return the numbers of nodes for depth and for the field.
+    """Return the numbers of nodes along depth and over the field of view.
 
     If both numbers are "auto", the error of depth may be half of the tolerance, and the error of the field the
     remainder, because the two errors add up. If no number for depth meets half of the tolerance, the field gets half of
@@ -177,7 +179,7 @@ def _choices(
 
 
 def _rest(tolerance: float, spent: float | None) -> float | None:
-    """Return the tolerance minus `spent`, an error that uses a part of it; None if this error is unknown or 0."""
+    """Return the tolerance minus the error `spent`, which uses a part of it; None if `spent` is None or 0."""
     return tolerance - spent if spent else None
 
 

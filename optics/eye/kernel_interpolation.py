@@ -2,7 +2,7 @@
 
 Kernels are computed at nodes that are evenly spaced over [-1, 1] along every axis, and interpolated linearly between
 them. The interpolation error is proportional to the square of the node spacing. It is measured by computing kernels
-between the nodes. Most of these kernels are reused, because the next larger set of nodes contains these points.
+at points between the nodes. Most of these kernels are reused, because these points are nodes of the next larger set.
 """
 
 from __future__ import annotations
@@ -64,10 +64,10 @@ def checks(counts: tuple[int, ...]) -> list[Place]:
     """Return the places at which the interpolation error is measured, for these numbers of nodes along each axis.
 
     If there is a single node, it lies in the middle. The error is then measured at both ends of the axis or, if there
-    are two axes, at the corners of the field and at the middles of its sides. With more nodes, it is measured halfway
-    between nodes, along every axis with several nodes. If there are many such points, only a few are used. If there is
-    one axis, these are evenly spaced. If there are two, they are the points next to all four corners and a few between
-    them, because the error of a pupil without symmetry may be largest at any corner.
+    are two axes, at the corners of the square [-1, 1]² and at the middles of its sides. With more nodes, it is measured
+    halfway between nodes, along every axis with several nodes. If there are many such points, only a few are used. If
+    there is one axis, these are evenly spaced. If there are two, they are the points next to all four corners and a few
+    between them, because the error of a pupil without symmetry may be largest at any corner.
     """
     if max(counts) == 1:
         return [place for place in _places([nodes(3)] * len(counts)) if any(place)]
@@ -83,7 +83,8 @@ def _place(axes: Sequence[np.ndarray], shares: Iterable[float]) -> Place:
     """Return a point: its coordinate along each axis is selected from the list of positions along this axis.
 
     axes: list of positions for each axis.
-    shares: for each axis, where in the list the coordinate is found, from 0 for the first position to 1 for the last.
+    shares: for each axis, the place of the selected position in its list: 0 for the first position, 1 for the last, and
+        a fraction for those between them.
     """
     return tuple(float(axis[round(share * (len(axis) - 1))]) for axis, share in zip(axes, shares, strict=True))
 
@@ -94,17 +95,19 @@ def _places(axes: Iterable[np.ndarray]) -> list[Place]:
 
 @dataclass(frozen=True)
 class NodeChoice:
-    """Choice of the numbers of nodes for one stage: along depth, or along the two axes of the field.
+    """Choice of the number of nodes along depth, or of the numbers along the two axes of the field of view.
 
     Nodes are the positions for which kernels are computed.
 
-    kernel_at: function that returns the kernel at a place in [-1, 1]^axes.
+    stage: "depth" or "field".
+    kernel_at: function that returns the kernel at a place, which has one coordinate from -1 to 1 for each axis.
     candidates: numbers of nodes to try, in ascending order.
-    samples_per_receptor: number of kernel samples along a side of the area over which a receptor averages light. Errors
-        of signals are averaged over this area. If the number is 1, errors are not averaged.
-    white: function that returns the signal of a white surface, as a fraction of its signal if kernels lost no light.
-        This fraction is less than 1 behind masks and with waveguides. Errors are divided by it. With waveguides, a call
-        of this function takes long, because it computes a kernel.
+    samples_per_receptor: number of kernel samples along a side of the area over which a receptor averages light.
+        Errors of signals are averaged over the same area. 1: errors are not averaged.
+    white: function that returns the signal of a white surface, divided by the signal that it would have if no light
+        were lost in the pupil or at the receptors. This fraction is less than 1 if the pupil has an absorbing mask, and
+        with waveguides. Errors are divided by it. With waveguides, a call of this function takes long, because it
+        computes a kernel.
     known: kernels that have been computed, by place.
     """
 
@@ -118,7 +121,7 @@ class NodeChoice:
     def choose(self, tolerance: float, most: float | None = None) -> Choice:
         """Return the first candidate whose predicted error is within `most` or, if that is None, the tolerance.
 
-        most: part of the tolerance that is available for this stage (None: all).
+        most: part of the tolerance that is available for the axes of this choice (None: all).
 
         Raises:
             NodeError: the predicted error of every candidate exceeds this limit.
@@ -157,7 +160,7 @@ class NodeChoice:
 
 
 def worst_difference(terms: Sequence[tuple[float, np.ndarray]], samples_per_receptor: int) -> float:
-    """Return the largest absolute signal that Σ weight · kernel can give for any scene with radiance in [0, 1].
+    """Return the largest absolute signal of the kernel Σ weight · kernel, over all scenes with radiance in [0, 1].
 
     It is the sum of the positive values of the combined receptive field (kernel ⊗ receptor aperture), or of the
     magnitudes of its negative values, whichever is larger.

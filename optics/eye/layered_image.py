@@ -22,12 +22,13 @@ SMALLEST = 1e-6  # avoids 0/0
 def retinal_image(
     light: np.ndarray, inverse_distance: np.ndarray, bank: KernelBank, shape: tuple[int, int], types: Precision
 ) -> Array:
-    """Return the image, Dr.Jit (band, *shape), of a scene whose near surfaces hide far ones, see `occlusion`.
+    """Return the image of a scene whose near surfaces hide far ones (see `occlusion`), Dr.Jit (band, row, column).
 
     If `bank.parallax` is 0, no surface hides another one.
 
     light: radiance (band, Y, X) of the cells, the equal rectangles into which the scene is divided.
     inverse_distance: 1/z [1/m] of the cells, (Y, X).
+    shape: numbers of rows and columns of the image.
     """
     scene = _Scene(light, inverse_distance, bank, shape, types)
     if bank.parallax == 0 or np.ptp(inverse_distance) == 0:
@@ -49,9 +50,10 @@ def retinal_image(
 class _Scene:
     """A scene with the kernels that blur it.
 
-    Cells are the equal rectangles into which the scene is divided. Arguments of the methods are arrays (Y, X) with one
-    entry per cell. An entry of `source` is the flat index of the cell whose light and distance are used at this
-    position: the cell itself, or a cell that replaces it. An entry of `cells` is True if the cell is selected.
+    Cells are the equal rectangles into which the scene is divided. Arguments `source` and `cells` of the methods are
+    arrays (Y, X) with one entry per cell. An entry of `source` is the flat index of the cell whose light and distance
+    are used in place of the cell's own: the cell itself, or another cell. An entry of `cells` is True if the cell is
+    selected.
     """
 
     light: np.ndarray
@@ -71,11 +73,13 @@ class _Scene:
     def passing(self, layer: Layer) -> Array:
         """Return the fraction of the light from farther layers that passes a layer, at each cell of the retina.
 
-        A layer contains the scene's cells in one range of distances. There are two kinds of cells. Hiding cells lie in
-        front of a farther surface. The other cells belong to a surface that continues in a farther layer. They hide
-        nothing, but the farther layer has no cells at their positions. Seen from a cell of the retina, the hiding cells
-        cover a fraction h of the pupil, and the other cells a fraction g. Light of the farther layer then comes only
-        through the fraction 1 - g of the pupil, so the passing fraction is 1 - h/(1 - g). The shape is (band, *shape).
+        Cells are the equal rectangles into which the scene and the retina are divided. A layer contains the cells of
+        the scene in one range of distances. There are two kinds of them. Hiding cells lie in front of a farther
+        surface. The other cells belong to a surface that continues in a farther layer. They hide nothing, but the
+        farther layer has no cells at their positions. Seen from a cell of the retina, the hiding cells cover a fraction
+        h of the pupil, and the other cells a fraction g. Light of the farther layer then comes only through the
+        fraction 1 - g of the pupil, so the passing fraction is 1 - h/(1 - g). The result has the axes (band, row,
+        column).
         """
         import drjit as dr
 
@@ -86,10 +90,10 @@ class _Scene:
         return dr.clip(1 - hidden, 0, 1)
 
     def _coverage(self, source: np.ndarray, cells: np.ndarray) -> Array:
-        """Return the fraction of the pupil that cells of the scene cover, seen from each cell of the retina.
+        """Return the fraction of the pupil that selected cells of the scene cover, seen from each cell of the retina.
 
-        Only cells of the scene that `cells` selects are included. For the arguments, see `_Scene`. The shape is
-        (band, *shape).
+        Cells are the equal rectangles into which the scene and the retina are divided. For the arguments, see `_Scene`.
+        The result has the axes (band, row, column).
         """
         ones = np.ones_like(self.light)
         return self._blurred([ones * share for share in self._shares(source, cells)], self._whole)
@@ -107,9 +111,9 @@ class _Scene:
         return [kernel / dr.reshape(one, (-1, 1, 1)) for kernel, one in zip(self.kernels, sums, strict=True)]
 
     def _shares(self, source: np.ndarray, cells: np.ndarray) -> list[np.ndarray]:
-        """Return, for each kernel of the bank, its interpolation weights in the cells of the scene, array (Y, X).
+        """Return one array (Y, X) for each kernel of `bank`: the kernel's interpolation weight in each scene cell.
 
-        The weights are 0 in cells that are not selected. For the arguments, see `_Scene`.
+        The weights are 0 in cells that `cells` does not select. For the arguments, see `_Scene`.
         """
         return [share * cells for share in self.bank.shares(self.inverse_distance.ravel()[source])]
 

@@ -1,17 +1,18 @@
-"""Layers of a scene with a depth map: near surfaces hide far ones, but their edges let a part of the light pass.
+"""Layers of a scene with a depth map: near surfaces hide far ones, in part where a near edge covers part of the pupil.
 
-Seen from a far point, a near edge hides a part of the pupil. The hidden fraction is the near surface's coverage, which
-is 1 on the surface and 0 elsewhere, blurred by the kernel for the distance of this surface. Layers are numbered from
-the farthest to the nearest. They are composited over one another:
+Seen from a far point, a near edge hides a part of the pupil. To compute the hidden fraction, the coverage of the near
+surface, an image that is 1 on the surface and 0 elsewhere, is blurred by the eye's kernel for its distance. Layers are
+numbered from the farthest to the nearest. They are composited over one another:
 
     image = Σ_l T_l · (kernel_l ⊗ radiance_l),   T_(l-1) = T_l (1 - kernel_l ⊗ coverage_l),
 
 where T_l is the fraction of light that passes all layers nearer than the layer l. Different layers are blurred
 independently, so the formula is exact if the far surface is locally uniform, or if either surface is in focus.
 
-A depth map contains no radiance behind a near surface. There, every cell of a far surface is a copy of the nearest
-visible cell of this surface. Cells are the equal rectangles into which the scene is divided. If the depth of a surface
-changes gradually, no part of the surface hides another part. Only jumps of depth hide light.
+A depth map contains no radiance behind a near surface. Each hidden cell of a far surface is therefore given the
+radiance and distance of the nearest visible cell of this surface. Cells are the equal rectangles into which the scene
+is divided. If the depth of a surface changes gradually, no part of the surface hides another part. Only jumps of depth
+hide light.
 """
 
 from __future__ import annotations
@@ -50,9 +51,12 @@ class Layer:
 def visible_layers(inverse_distance: np.ndarray, parallax: float) -> Iterator[Layer]:
     """Yield the layers of a depth map from the nearest to the farthest.
 
-    inverse_distance: 1/z [1/m] of the cells, the equal rectangles into which the scene is divided, (Y, X).
-    parallax: shift [cells] of a near point relative to a far one between views from opposite edges of the pupil,
-        divided by the difference of the points' 1/z [1/m]. With 0, no surface hides another one.
+    The scene is divided into equal rectangles, called cells.
+
+    inverse_distance: inverse 1/z [1/m] of the distance of each cell, array (Y, X).
+    parallax: factor p [cells m] in the shift p (1/z₁ - 1/z₂) of a near point relative to a far one, between views from
+        opposite edges of the pupil. z₁ and z₂ are the distances [m] of the near and the far point. With 0, no surface
+        hides another one.
     """
     from scipy.ndimage import distance_transform_edt
 

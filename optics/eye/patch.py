@@ -1,4 +1,4 @@
-"""A single receptor of an eye as an eye of its own, for limits of vision, which differ between an eye's receptors."""
+"""Eyes with a single receptor, made from one receptor of an eye to compute the limits of vision of that receptor."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Signal of a photoreceptor from the light on it: throughput, spectral weighting, noise.
 
-`optics.Eye.see` draws noise with the functions of this module, worlds with `sim.render.receptor_noise`.
+`optics.Eye.see` draws noise with the functions of this module. Simulated worlds use `sim.render.receptor_noise`.
 """
 
 from __future__ import annotations

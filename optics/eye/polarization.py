@@ -6,8 +6,9 @@ then absorb as much as in unpolarised light of the same radiance, times
 
     1 + p (d - 1)/(d + 1) cos 2(ψ - φ),
 
-which is 2(d cos²α + sin²α)/(d + 1) with α = ψ - φ for p = 1. The absorbed light is linear in the Stokes parameters I,
-Q = I p cos 2ψ and U = I p sin 2ψ. The optics blur Q and U in the same way as the radiance I.
+where α = ψ - φ is the angle between the two. If p = 1, this factor is 2(d cos²α + sin²α)/(d + 1). The absorbed light is
+linear in the Stokes parameters I, Q = I p cos 2ψ and U = I p sin 2ψ. The optics blur Q and U in the same way as the
+radiance I.
 """
 
 from __future__ import annotations

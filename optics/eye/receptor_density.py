@@ -28,9 +28,9 @@ class Fovea:
     """Receptors whose acuity falls with the angle E from the fovea, as 1/(1 + E/E₂).
 
     The number of columns of receptors per horizontal angle and the number of rows per vertical angle follow this law.
-    The density is the product of both. If the field is a square around the fovea, the receptors there have the shape of
-    the average receptor. The default E₂ is that of midget ganglion cells, which limit human acuity. Source: Watson,
-    J. Vision 14(7):15, 2014, equation 8. The first term of this equation is a density of (1 + E/E₂)⁻² in all
+    The density is the product of both. If the field is a square around the fovea, the receptors at the fovea have the
+    shape of the average receptor. The default E₂ is that of midget ganglion cells, which limit human acuity. Source:
+    Watson, J. Vision 14(7):15, 2014, equation 8. The first term of this equation is a density of (1 + E/E₂)⁻² in all
     directions. The second, smaller term is left out.
 
     e2_deg: angle E₂ [degrees] at which acuity is half of that at the fovea, 1e-3 to 1e3.
@@ -79,7 +79,7 @@ class VisualStreak:
     def __call__(self, right_deg: np.ndarray, up_deg: np.ndarray) -> np.ndarray:
         """Return the number of receptors per area of the flat retina, up to a constant factor.
 
-        right_deg, up_deg: angles [degrees] from the eye's axis of the directions that the receptors see.
+        right_deg, up_deg: directions that the receptors see, as angles [degrees] from the eye's axis.
         """
         return _per_length(right_deg, 0.0, np.inf) * _per_length(up_deg, self.elevation_deg, self.e2_deg)
 

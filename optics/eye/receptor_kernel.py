@@ -31,7 +31,8 @@ def receptor_kernel(eye: EyeSpec, retina: Retina, z: Scalar, direction: tuple[fl
     """Return the kernel of an eye, a Dr.Jit tensor (band, ky, kx); see `Eye.kernel`.
 
     direction: tangents (right, down) of the source's direction.
-    from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
+    from_cell: True if the source is an area of the scene whose geometric image is as large as a cell of the retina,
+        False if the source is the point at the centre of this area.
     """
     if eye.pupil is None:
         return precision(retina.dtype).Tensor(np.ones((len(retina.wavelengths), 1, 1)))
@@ -44,11 +45,11 @@ def receptor_kernel(eye: EyeSpec, retina: Retina, z: Scalar, direction: tuple[fl
 
 
 def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
-    """Return the signal of a white surface in daylight, as a fraction of its signal if kernels lost no light.
+    """Return the signal of a white surface in daylight, relative to the signal if all light reached the receptors.
 
-    It is averaged over channels.
+    This fraction is averaged over channels.
 
-    kernels: the eye's kernels, array (band, ky, kx).
+    kernels: the eye's kernels, array (band, ky, kx). Their sums are below 1 if light is lost.
     """
     seen = kernels.sum(axis=(1, 2)) * daylight(bands.wavelengths)
     return float((bands.weights @ seen).mean())
@@ -57,9 +58,9 @@ def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
 def bands_for(eye: EyeSpec, retina: Retina, direction: tuple[float, float]) -> SpectralBands:
     """Return the fewest spectral bands whose error is within the eye's tolerance, see `choose_bands`.
 
-    retina: the eye's retina. Each side of a receptor is divided into two cells, the samples of a kernel. The field
-        `wavelengths` may be empty. It is not used, because several numbers of bands are tried, and kernels are computed
-        at the wavelengths of these bands.
+    retina: the eye's retina, with two cells along each side of a receptor. Kernels, which describe the blur, have one
+        value per cell. `retina.wavelengths` is not used and may be empty, because several numbers of bands are tried,
+        and kernels are computed at the wavelengths of these bands.
     direction: tangents (right, down) of the direction in which the kernels are computed.
     """
     if eye.pupil is None:

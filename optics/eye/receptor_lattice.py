@@ -73,7 +73,8 @@ class ReceptorLattice(ReadOnlyArrays):
         """Return the angles [degrees] that the receptors subtend vertically and horizontally, (2, h, w).
 
         size: average width and height of the receptors on the plane at distance 1 in front of the eye.
-        middle: position (right, down) of the field's middle on this plane, the tangents of its angles from the axis.
+        middle: position (right, down) of the field's middle on this plane. Its coordinates are the tangents of the
+            angles between the axis and the direction of the middle.
         """
         at, half = self.middles * size + middle, self.sides * np.reshape(size[::-1], (2, 1, 1)) / 2
         found = []
@@ -178,7 +179,12 @@ def overlaps(edges: np.ndarray, cells: int) -> np.ndarray:
 
 
 def _edges(densities: np.ndarray, count: int) -> np.ndarray:
-    """Return edges (row, count + 1) from -count/2 to count/2, between which the densities of a row have equal sums."""
+    """Return edges that divide the range from -count/2 to count/2 into `count` intervals, array (row, count + 1).
+
+    The integral of a row's density is the same over all of its intervals.
+
+    densities: densities of equal cells over the same range, array (row, cell).
+    """
     cells = densities.shape[1]
     sums = np.concatenate([np.zeros((len(densities), 1)), np.cumsum(densities, axis=1)], axis=1)
     at, shares = np.arange(cells + 1) / cells - 0.5, np.arange(1, count) / count

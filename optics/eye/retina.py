@@ -1,4 +1,4 @@
-"""The retina, a plane that is divided into cells, and errors about PSFs that need too many cells or too much time."""
+"""The retina, a plane divided into cells, and exceptions for PSFs that cover too many cells or take too long."""
 
 from __future__ import annotations
 
@@ -45,8 +45,9 @@ class Retina:
     def across_pupil(self, direction: tuple[float, float]) -> tuple[float, float]:
         """Return the tangents (x, y), in the pupil's axes, of the direction in which the light of a source travels.
 
-        Light from the right travels to the left, as seen by the eye's owner. This is the direction +x. Light from below
-        travels up, in the direction +y. Both signs are reversed if the pupil is turned.
+        The x axis points to the left, as seen by the eye's owner, so light from the right travels in the direction +x.
+        The y axis points up, so light from below travels in the direction +y. Both axes are reversed if the pupil is
+        turned.
 
         direction: tangents (right, down) of the source's direction in the visual field.
         """

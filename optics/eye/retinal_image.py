@@ -1,4 +1,4 @@
-"""Images on the retina, by convolution of the padded scene with kernels. They are the reference for renderers."""
+"""Images on the retina, by convolution of the padded scene with kernels. The images are the reference for renderers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ __all__ = ["at_receptors", "blur", "centred", "mean_over", "receptor_average", "
 def blur(
     scenes: Sequence[np.ndarray], kernels: Sequence[np.ndarray | Array], shape: tuple[int, int], types: Precision
 ) -> Array:
-    """Return the middle part of Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u] at cells v, Dr.Jit (band b, *shape).
+    """Return the sum of several scenes, each convolved with its own kernel.
+
+    The value at the cell v in the band b is Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u], where l counts the scenes and
+    u runs over the cells of a kernel. The result is the middle part of this image, a Dr.Jit tensor (band, *shape).
 
     scenes: arrays (band, Y, X). Beyond the borders of its array, a scene is dark.
     kernels: one tensor or array (band, ky, kx) per scene, with odd ky and kx.
@@ -37,9 +40,11 @@ def blur(
 
 
 def _blurred(pairs: list[tuple[np.ndarray, Array]], shape: tuple[int, int], types: Precision) -> Array:
-    """Return one band of the blurred image, of the size `shape`, as a flat array.
+    """Return one band of the blurred image, the sum of several scenes that are each convolved with their own kernel.
 
-    pairs: each scene (Y, X) with its kernel (ky, kx).
+    The result is the image's middle part, which has the size `shape`, as a flat array.
+
+    pairs: for each scene, its radiance (Y, X) and its kernel (ky, kx).
 
     Fourier transforms repeat the image periodically. The period is so long that the repeated parts do not overlap the
     part that is returned.
@@ -116,16 +121,18 @@ def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def receptor_average(image: Array, samples_per_receptor: int, types: Precision) -> Array:
-    """Return the mean over the cells of each receptor, a Dr.Jit tensor (band, row, column) with one value per receptor.
+    """Return the mean of an image over each receptor, a Dr.Jit tensor (band, row, column) with one value per receptor.
 
-    image: Dr.Jit tensor (band, y, x) with one value per cell.
+    image: Dr.Jit tensor (band, y, x). Its samples belong to the equal cells into which each receptor is divided.
     samples_per_receptor: number of cells along each side of a receptor.
     """
     return _of_receptors(image, np.full(samples_per_receptor, 1 / samples_per_receptor), types)
 
 
 def mean_over(lattice: ReceptorLattice, image: Array, types: Precision) -> Array:
-    """Return the mean of an image over each receptor's rectangle, a Dr.Jit tensor (band, row, column) of receptors.
+    """Return the mean of an image over each receptor's rectangle.
+
+    The result is a Dr.Jit tensor (band, row, column) with one value per receptor.
 
     image: Dr.Jit tensor (band, y, x). Its values belong to equal cells, into which the retina is divided. The image is
         constant within a cell.
@@ -154,7 +161,8 @@ def at_receptors(image: Array, samples_per_receptor: int, types: Precision) -> A
     """Return the image's value in the cell at each receptor's middle.
 
     If the number of cells along a receptor's side is even, the middle lies between cells. The value is then that of the
-    cell after the middle along y and x. It is correct if `with_centre` has shifted the kernels by half a cell.
+    cell after the middle along y and x. This value belongs to the middle only if the image was computed with kernels
+    that `with_centre` has shifted by half a cell.
     """
     return _of_receptors(image, np.arange(samples_per_receptor) == samples_per_receptor // 2, types)
 
@@ -169,9 +177,11 @@ def with_centre(kernel: Array) -> Array:
 
 
 def _of_receptors(image: Array, shares: np.ndarray, types: Precision) -> Array:
-    """Return weighted sums over the cells of each receptor, (band, receptor row, receptor column).
+    """Return weighted sums of an image over each receptor, (band, receptor row, receptor column).
 
-    shares: weights of a receptor's rows of cells. Its columns have the same weights.
+    image: values (band, y, x) in the equal cells into which each receptor is divided.
+    shares: weights of the rows of cells in a receptor, (row,). The columns of cells have the same weights. The weight
+        of a cell is the product of both.
     """
     down, across = (types.Tensor(np.kron(np.eye(n // len(shares)), shares)) for n in image.shape[1:])
     return matmul(down, matmul(image, across, transposed=True))

@@ -1,4 +1,4 @@
-"""Table of an eye's limits."""
+"""Table of the properties that limit an eye's vision, such as diffraction, the spacing of receptors, and noise."""
 
 from __future__ import annotations
 
@@ -31,22 +31,20 @@ Kernels = Callable[[int], Array | np.ndarray]  # cells per receptor -> kernel (b
 class Description:
     """Limits of an eye in white daylight, at the field's centre. Frequencies are in cycles per degree of visual angle.
 
-    relative_aperture: a, the pupil's diameter relative to that of a pupil with a throughput of 1.
+    relative_aperture: a, the pupil's diameter divided by the diameter of the eye's widest pupil.
     throughput: a², times the open fraction of the aperture's disk, times the mask's transmission.
     f_number: focal length f, divided by the pupil's diameter. A distance x on the retina corresponds to the angle x/f,
         so f is n₀/n times the distance to the retina, with the indices n behind and n₀ before the pupil. The brightness
         of the image is proportional to 1/f_number².
     wavelength: mean wavelength [m] of daylight, weighted by the receptors.
-    diffraction_cpd: cut-off frequency of diffraction at the pupil, 2 sin θ/λ on the retina, where θ is half the angle
-        of the cone of light.
+    diffraction_cpd: cut-off frequency of diffraction, 2 sin θ/λ on the retina, with the cone of light's half angle θ.
     sampling_cpd: Nyquist frequency of the receptors, 1/(2 Δφ), horizontally.
-    noise_cpd: lowest frequency at which the contrast of the optics falls below `noise` divided by `white_signal`, or
-        the cut-off frequency if it never does.
+    noise_cpd: lowest frequency with a contrast below `noise`/`white_signal`, or the cut-off frequency if there is none.
     acuity_cpd: horizontal acuity, the smallest of these three frequencies; NaN if one is unknown.
     acuity_vertical_cpd: vertical acuity, with the Nyquist frequency of the receptors' rows.
     binding: name of the smallest known limit: "diffraction", "sampling" or "noise".
     strehl_ratio: Strehl ratio of the band nearest `wavelength`.
-    image_quality: `white_signal` times the mean, up to the Nyquist frequency, of the contrast's excess over the noise.
+    image_quality: `white_signal` times the mean of max(contrast - `noise`/`white_signal`, 0) up to `sampling_cpd`.
     noise: standard deviation of the signal of a receptor that sees white, from all sources of noise.
     photons: photons that a receptor that sees white absorbs per integration time, mean of channels; None if unknown.
     acceptance_angle_deg: full width at half maximum of a receptor's angular sensitivity, horizontally.
@@ -56,8 +54,7 @@ class Description:
         vertically, ((smallest, largest), (smallest, largest)). None: all receptors have the same size on the retina.
     plan: plan of the PSF of the least accurate band.
     white_signal: signal of a receptor that sees white: the throughput, reduced by the losses of waveguides.
-    unknown: one line, with the reason, for each measure that cannot be computed accurately enough from the PSF. The
-        value of such a measure is NaN.
+    unknown: one line, with the reason, for each measure that is NaN because the PSF is not accurate enough.
     """
 
     relative_aperture: float
@@ -124,7 +121,7 @@ class Description:
         return "\n".join(f"{name:<20}{value}" for name, value in rows.items())
 
     def _vertical_rows(self, bound: str) -> dict[str, str]:
-        """Return the table's rows about vertical acuity, or an empty dictionary if receptors are square."""
+        """Return printed rows on vertical acuity, none if receptors are square. `bound` is a text before the acuity."""
         if math.isclose(self.interommatidial_vertical_deg, self.interommatidial_angle_deg, rel_tol=1e-9):
             return {}
         apart = f"rows of receptors {self.interommatidial_vertical_deg:.3g}° apart"
@@ -158,9 +155,10 @@ def noise_of(eye: EyeSpec, white_signal: Scalar) -> float:
 
 
 def _photons_of(eye: EyeSpec) -> float | None:
-    """Return the photons that a receptor absorbs for a signal of 1, averaged over types; None without a photon budget.
+    """Return the photons that a receptor absorbs for a signal of 1, or None if the eye has no `photon_budget`.
 
-    Receptors with dynamics integrate over the time that their filter defines. The budget's time is not used.
+    The number is averaged over the types of receptors. It is for the integration time of the receptors' temporal filter
+    if the eye has dynamics, and otherwise for the integration time of the budget.
     """
     if eye.photons is None or eye.photon_budget is None:
         return None
@@ -177,7 +175,8 @@ def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> 
 
     light: signal of a receptor that sees white.
     result: PSF for this distance.
-    kernel: function that returns the kernel for a number of cells per receptor, for the same distance.
+    kernel: function that returns the eye's kernel (band, y, x) for the same distance. Its argument is the number of
+        cells, the samples of the kernel, along a receptor's side.
     """
     distance = number(eye.sensor_distance)
     white = daylight_psf(eye, result)
@@ -252,7 +251,8 @@ def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
 def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
     """Return the full width [m] at half maximum of a receptor's sensitivity to white daylight, along x.
 
-    The sensitivity is the PSF convolved with the receptor's aperture. With a waveguide, it is the receptor's kernel.
+    The sensitivity is the PSF convolved with the receptor's aperture. If the receptor is a waveguide, the sensitivity
+    is the fraction of light that the waveguide accepts from each direction.
     """
     if eye.pupil is None:
         return eye.receptor_pitch
@@ -272,7 +272,7 @@ def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
 def _guided_acceptance(eye: EyeSpec, diameter: float, kernel: Kernels) -> float:
     """Return the full width [m] at half maximum, along x, of the sensitivity of a receptor with a waveguide.
 
-    The sensitivity to white light is known for each cell of the scene. A spline interpolates it between cells.
+    The sensitivity to white light is computed in steps of a fraction of a receptor. A spline interpolates between them.
 
     diameter: diameter [m] of the waveguide.
     """
@@ -288,7 +288,7 @@ def _guided_acceptance(eye: EyeSpec, diameter: float, kernel: Kernels) -> float:
 
 
 def _within(x: np.ndarray, image: np.ndarray, at: np.ndarray, half: float) -> np.ndarray:
-    """Return integrals from `at - half` to `at + half`, along the first axis, of the spline through samples at x."""
+    """Return, for each `at`, the integral from `at - half` to `at + half` of a spline through `image` (x, …)."""
     from scipy.interpolate import CubicSpline
 
     primitive = CubicSpline(x, image).antiderivative()

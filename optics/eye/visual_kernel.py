@@ -1,4 +1,4 @@
-"""Receptive fields behind a pupil: integrals of a source's PSF over each cell of the retina that its light reaches."""
+"""Receptive fields behind a pupil: integrals of a source's PSF over each cell of the retina that the PSF reaches."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Spot:
     half: half the side [m] of the square around it that contains the light.
     pitch: sampling pitch [m] that resolves the PSF.
     needs: window and sampling that each wavelength requires.
-    on_retina: True if the square's size was limited. Light outside the square then counts as blocked, see `spot_of`.
+    on_retina: True if `half` was limited to a side of the retina. Light outside the square then counts as blocked.
     """
 
     centre: tuple[float, float]
@@ -71,7 +71,7 @@ class Spot:
 
     @property
     def half_of_rays(self) -> float:
-        """The smaller of `half` and half the side [m] of a square that would be sufficient without diffraction."""
+        """Half the side [m] of a square around `centre` that nearly all undiffracted rays hit; at most `half`."""
         return min(self.half, max(need.half_of_rays for need in self.needs))
 
     def window(self, pitch: float, beside: int = 0) -> Grid:
@@ -86,15 +86,15 @@ class Spot:
 def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], from_cell: bool) -> Array:
     """Return the PSF of a point at distance z [m], integrated over cells of the retina around the geometric image.
 
-    The result is a Dr.Jit tensor (band, row, column) with odd numbers of rows and columns. The rows ascend with y and
-    the columns with x. As the image is inverted, this is from top to bottom and left to right of the visual field.
+    Cells are equal parts of receptors. The result is a Dr.Jit tensor (band, row, column) with odd numbers of rows and
+    columns. It starts at the top left of the visual field, where y and x on the retina are smallest.
 
     direction: tangents (right, down) of the source's direction in the visual field.
-    from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
+    from_cell: True if the source is an area whose geometric image is as large as a cell, False if it is a point.
 
     Raises:
         ValueError: the retina's distance carries derivatives, and the source is off the axis.
-        AccuracyError: the limits on memory and time are too low for the tolerance, or the light covers too many cells.
+        AccuracyError: the tolerance needs more memory or time than allowed, or the light covers too many cells.
     """
     import drjit as dr
 
@@ -130,12 +130,12 @@ def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float]) -> PSFResult:
     """Return the PSF of a point at distance z [m], with at least 1 - `retina.tolerance` of each wavelength's light.
 
-    Light from a steep relief may count as blocked if it misses the geometric image by more than a side of the retina.
+    Light from a steep relief may count as blocked if it is farther than `min(retina.size)` from the geometric image.
 
     direction: tangents (right, down) of the point's direction in the visual field.
 
     Raises:
-        AccuracyError: the limits on memory and time are too low for the tolerance, or the light covers too many cells.
+        AccuracyError: the tolerance needs more memory or time than allowed, or the light covers too many cells.
     """
     beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
     return _on_spot(lambda spot: _spread(beams, spot, retina), beams, retina)
@@ -144,7 +144,7 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float,
 def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retina) -> Result:
     """Return the result of `compute` for the square that the light reaches or, if `compute` fails, a smaller square.
 
-    Two smaller squares are tried for steep reliefs, with half sides up to the retina's longer or shorter side.
+    For steep reliefs, half the side is first limited to the retina's longer side, and then to its shorter side.
 
     Raises:
         AccuracyError: `compute` fails for every square. The error is the one for the first square.
@@ -169,11 +169,11 @@ def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, flo
 def spot_of(beams: list[Beam], retina: Retina, most: float = math.inf) -> Spot:
     """Return the square, centred on the geometric image, that contains the light.
 
-    most: largest half side [m]. The retina's longer side is enough for the light from any point of the visual field to
-        any receptor. Light outside the square counts as blocked by the rim of the eye.
+    most: upper bound on half the square's side [m]. Light outside the square counts as blocked by the rim of the eye.
+        If the bound is the retina's longer side, blocked light from the visual field would miss all receptors anyway.
 
     Raises:
-        CellsError: the square would be too many cells wide. Cells are the rectangles into which receptors are divided.
+        CellsError: too many cells, the rectangles into which receptors are divided, lie along a side of the square.
     """
     distance = number(retina.distance)
     centre_x, centre_y = _image(beams[len(beams) // 2], distance)
@@ -202,7 +202,7 @@ def _image(beam: Beam, distance: float) -> tuple[float, float]:
 
 
 def _pitch_for_cells(pitch: float, retina: Retina) -> float:
-    """Return the largest pitch [m] for integrals of the PSF over cells, given the `pitch` that resolves the PSF."""
+    """Return the pitch [m] that is fine enough to integrate the PSF over cells. `pitch` resolves the PSF itself."""
     each = samples_per_cycle(retina.tolerance)
     return pitch * each / samples_per_cycle(retina.tolerance, min(retina.cell) / (pitch * each))
 
@@ -221,7 +221,7 @@ def _request(beam: Beam, spot: Spot, need: _WindowNeeds, window: Grid, retina: R
 
 
 def perfect_psf(retina: Retina, radius: float) -> PSFResult:
-    """Return a PSF with all power in one cell: a perfect lens of this aperture radius [m], without diffraction."""
+    """Return the PSF of a perfect lens of this radius [m] without diffraction: all light is in one cell."""
     types = precision(retina.dtype)
     _, width = retina.cell
     image = types.Tensor(np.full((len(retina.wavelengths), 1, 1), 1 / width**2))
@@ -231,11 +231,11 @@ def perfect_psf(retina: Retina, radius: float) -> PSFResult:
 
 
 def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNeeds:
-    """Return the window around the geometric image `centre` (x, y) [m] and the samples that one wavelength requires.
+    """Return the window around the geometric image `centre` (x, y) [m] and the sampling that one wavelength requires.
 
-    The window may lose the fraction `tolerance` of the light: half of it by diffraction at the pupil's edge, and half
-    as rays that miss the window. If masks, pixels or fine detail scatter light, rays and scattered light share this
-    second half equally. Diffraction that adds a frequency f increases the sine of a ray's angle by λf.
+    The fraction `retina.tolerance` of the light may miss the window. Half of this fraction is for diffraction at the
+    pupil's edge, which increases the sine of a ray's angle by λf for a frequency f. The other half is for rays or, if
+    the mask, the relief or the wavefront scatters light, one quarter for rays and one quarter for scattered light.
     """
     pupil, z, radius = beam.pupil, number(retina.distance), beam.pupil.radius
     wavelength = beam.wavelength / beam.index
@@ -269,11 +269,11 @@ def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float,
 
 
 def _beyond_edge(pupil: Pupil, fraction: float) -> float:
-    """Return δ [1/m]: an aperture's hard edge changes the frequency of this fraction of the light by more than δ.
+    """Return the change δ [1/m] of spatial frequency that this fraction of the light exceeds behind a hard edge.
 
-    The squared spectrum of a straight edge, integrated over changes above δ, is 1/(2π²δ) per length. For an aperture of
+    Per length of a straight edge, the squared spectrum at changes above δ has the integral 1/(2π²δ). For an aperture of
     perimeter P and area A, the fraction is thus P/(2π²Aδ), and for a disk 1/(π²Rδ) (Airy pattern, Born & Wolf, §8.5.2).
-    Behind a mask that is brighter along the edge, the fraction is larger.
+    If the light behind a mask is brighter at the edge than on average, `_rim` multiplies the fraction.
     """
     opening = pupil.aperture
     return _rim(pupil) * opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * fraction)
@@ -283,7 +283,7 @@ def _beyond_edge(pupil: Pupil, fraction: float) -> float:
 def _rim(pupil: Pupil) -> float:
     """Return the mean intensity behind the mask along the aperture's edge, divided by its mean over the aperture.
 
-    It is 1 without a mask. Values below 1 are replaced by 1: behind a dark edge, the rise of intensity diffracts light.
+    It is 1 without a mask and never less: a mask with a dark edge diffracts light where its transmission increases.
     """
     import drjit as dr
 
@@ -296,5 +296,5 @@ def _rim(pupil: Pupil) -> float:
 
 
 def _cells_within(half: float, cell: float) -> int:
-    """Return the odd number of cells that cover the distance `half` on both sides of the middle of the middle cell."""
+    """Return the odd number of cells in the shortest row that extends at least `half` to both sides of its middle."""
     return 2 * math.ceil(max(half / cell - 0.5, 0) - 1e-6) + 1

@@ -11,7 +11,7 @@ pupil_edge           the soft edge of a pupil
 diffraction_kernel   the kernel of the integral, with its near field
 method_sampling      Sampling: the interface of all methods
 rayleigh_sommerfeld  the direct sum of the integral, the reference for all other methods
-angular_spectrum     the angular spectrum on grids, propagated in one step or in two: non-paraxial part, paraxial part
+angular_spectrum     the angular spectrum on grids, propagated in one step, or in two, of which the second is paraxial
 spectrum_sampling    the grids between which the angular spectrum transforms fields, and the Fourier sums that do this
 row_blocks           blocks of rows of a large pupil, whose spectra are summed
 derivative_cells     nodes between the knots of spline maps, for derivatives with respect to the maps' samples
@@ -26,7 +26,7 @@ remaining_factor     the slow factor, divided by its values along both axes
 window_sampling      `low_rank` at coarse tolerances, for one PSF, with only the samples that the PSF requires
 window_plan          samples of several pupils at coarse tolerances, only as many as the light in the window requires
 window_geometry      the part of a `window_plan` that does not depend on reliefs and wavefronts
-window_edges         soft edges of pupils of a `window_plan`, and their sampling density; smoothed waves of wide pupils
+window_edges         soft edges of pupils of a `window_plan`, and the numbers of samples that such pupils need
 window_bands         spatial frequencies of the light and of the soft edges of `window_edges`
 window_rank          number of points of the window between which a `window_plan` interpolates the slow factor
 window_images        PSFs of several pupils from the samples of `window_plan`
@@ -40,9 +40,9 @@ mirrored_matrix      products with matrices that do not change if the orders of 
 window_sums          sums over the pupil for `window_sampling` and `window_stack`, and their adjoint
 far_field            a Fourier transform from the pupil to directions for each of a few points (nodes) of the window
 far_field_nodes      the choice of the nodes of `far_field`, and their weights in every direction
-fresnel              approximate: Fresnel and Fraunhofer, with their predicted errors
-geometric            approximate: density of rays; the pinhole
-smythe               vector fields from fields that scalar methods propagate
+fresnel              approximate: the integrals of Fresnel and Fraunhofer, with their predicted errors
+geometric            approximate: the density of rays, without diffraction, and the image of an ideal pinhole
+smythe               vector fields by Smythe's integral, whose parts are computed with scalar methods
 vector_sum           vector fields about a focus, as a sum of plane waves
 scalar_theory        upper bound on the error of scalar theory
 rays                 end points of rays in geometrical optics

@@ -56,7 +56,10 @@ class GridSampling(SpectrumSampling):
 
     @cached_property
     def pupil(self) -> Grid:
-        """Grid in the pupil's plane. It covers the aperture with its soft edge, but at most one period of the field."""
+        """Grid in the pupil's plane.
+
+        It covers the aperture with its soft edge, or one period if this is narrower. The field repeats after a period.
+        """
         pitch = self.period / self.pupil_period
         across = 2 * math.ceil(self.edge.outermost / pitch) + 1
         return Grid.square(min(self.pupil_period, across), pitch)
@@ -122,8 +125,8 @@ def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
     """Return the period [m] after which the field repeats, and the number of its samples at the window's pitch.
 
     Fourier transforms on a grid add copies of the field, one period apart. The period is so long that the light of the
-    copies does not reach the window. Unless `problem.steep` is True, light that arrives farther from the axis than
-    `problem.reach` is excepted. It is negligible, so its copies may overlap the rim of the window.
+    copies does not reach the window. Copies of light farther from the axis than `problem.reach` may overlap the rim of
+    the window, because this light is negligible. If `problem.steep` is True, it is not negligible and must not overlap.
 
     outermost: distance [m] from the axis at which the pupil ends.
     """
@@ -137,11 +140,13 @@ def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
 
 
 def split_period(problem: Problem, taper: Taper, outermost: float) -> tuple[float, int]:
-    """Return the period [m] and the number of its samples.
+    """Return the period [m] after which the field in the relay plane repeats, and the number of samples in a period.
 
-    The period covers the pupil, the blur of the taper, and the non-paraxial displacement z (tan θ - sin θ), with the
-    distance z of the window and the angle θ at which the taper ends. Fresnel's integral repeats the field at distances
-    of λz divided by the pitch. The samples are so dense that these copies do not reach the window.
+    The split method first propagates light to this plane, without the paraxial part of the phase, which Fresnel's
+    integral adds later. The taper fades the spectrum out towards an angle θ from the axis, which blurs the field. The
+    period covers the pupil, this blur, and the non-paraxial displacement z (tan θ - sin θ) of light at the angle θ,
+    where z is the distance of the window. Fresnel's integral repeats the field at distances of λz divided by the pitch.
+    The samples are so dense that these copies do not reach the window.
 
     outermost: distance [m] from the axis at which the pupil ends.
     """
@@ -177,8 +182,9 @@ def _spectrum_cost(how: GridSampling, dtype: str) -> tuple[float, float]:
 def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
     """Return the field over the window, U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10).
 
-    U₀ is the field behind the pupil, F the Fourier transform and H the transfer function. If `how` belongs to the
-    split method, the result lacks a phase that does not affect the intensity.
+    U₀ is the field behind the pupil, F the Fourier transform and H the transfer function. If `how` is a sampling
+    for the split method, which propagates light in two steps, the result lacks a phase that does not affect the
+    intensity.
     """
     spectrum = _spectrum(beam, how, types)
     found = arrived(spectrum, beam, problem, how).scaled((how.pupil.dx / how.period) ** 2)
@@ -186,7 +192,7 @@ def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Pr
 
 
 def _spectrum(beam: Beam, how: GridSampling, types: Precision) -> Field:
-    """Return the spectrum of the field behind the pupil, as the sum over blocks of rows."""
+    """Return the spectrum of the field behind the pupil, as the sum of the spectra of blocks of the pupil's rows."""
     total = None
     for first, block in row_blocks(how.part(how.pupil)):
         u = beam.behind(how.edge.aperture, block, types)
@@ -212,8 +218,8 @@ def transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precisi
     """Return the product of the transfer function exp(ikz (cos θ - 1)) (Goodman, eq. 3-74) and the taper of `how`.
 
     θ is the angle of the light with the axis. The taper fades light out near grazing incidence. With q = 1 - cos θ, the
-    exponent is -ikz q. The split method leaves the paraxial part of the exponent, -ikz sin²θ/2, to Fresnel's integral.
-    Because q - sin²θ/2 = q²/2, the exponent -ikz q²/2 remains.
+    exponent is -ikz q. The split method, which propagates light in two steps, leaves the paraxial part of the exponent,
+    -ikz sin²θ/2, to the second step, Fresnel's integral. Because q - sin²θ/2 = q²/2, the exponent -ikz q²/2 remains.
     """
     import drjit as dr
 
@@ -230,8 +236,9 @@ def transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precisi
 def versine(s2: Array) -> Array:
     """Return q = 1 - cos θ from sin²θ, in float64.
 
-    The difference 1 - cos θ loses digits, and multiplication by kz would magnify this error. One correction step
-    towards the solution of q (2 - q) = sin²θ restores the digits without a division.
+    At small angles, rounding errors of cos θ are large relative to the difference 1 - cos θ. In the phase kz q, with
+    the wave number k and the distance z, they would be magnified. One correction step towards the solution of q (2 - q)
+    = sin²θ removes them without a division.
     """
     import drjit as dr
 
@@ -240,7 +247,7 @@ def versine(s2: Array) -> Array:
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Return the field over the window, from a spectrum that lacks only the paraxial part of the propagation.
+    """Return the field over the window, from a spectrum that has propagated without the paraxial part of the phase.
 
     A Fourier transform gives the field in an intermediate plane, the relay plane. From there to the window, Fresnel's
     integral adds the paraxial part.

@@ -32,19 +32,19 @@ class HasDirections(Protocol):
 
     @property
     def elsewhere(self) -> float | np.ndarray:
-        """A fixed sine, which selects the points of the pupil for which the slow factor is evaluated.
+        """Sine that points of the pupil have in common along one axis, minus the sine of the pupil's centre.
 
-        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. The sines of a point are the x and y
-        components of the unit vector from the window's middle to the point. Along x, the slow factor is evaluated for
-        points whose sine along y is the fixed one. Along y, it is evaluated for points whose sine along x is the fixed
-        one. The value of this property is the fixed sine minus the sine of the pupil's centre.
+        The sines of a point are the x and y components of the unit vector from the window's middle to the point. The
+        slow factor, the ratio of the diffraction kernel to a Fourier kernel, is computed along x for points that have
+        different sines along x and a common sine along y. Along y, it is computed for points that have different sines
+        along y and a common sine along x. This property gives the common sine in both cases.
         """
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points (x, y) [m] of the pupils that have the sines s along x and t along y.
+        """Return the points (x, y) [m] of the pupils in given directions from the window's middle.
 
-        Sines are the x and y components of the unit vector from the window's middle to a point. The sines of the
-        pupil's centre are subtracted from s and t.
+        s, t: x and y components of the unit vector from the window's middle to each point, minus the components of the
+            unit vector to the pupil's centre.
         """
 
 
@@ -54,11 +54,12 @@ class AxisFactor:
 
     The slow factor is the ratio of the diffraction kernel to a Fourier kernel, and varies slowly over the window. The
     sines of a point of the pupil are the components of its direction along x and y, as seen from the middle of the
-    window. The points have different sines along `axis`. Along the other axis, the sine of each is the sine of the
-    pupil's centre plus `samples.elsewhere`. The points, and the factor at the middle of the window, are computed once.
+    window. The points have different sines along `axis`. Along the other axis, all points have the same sine: that of
+    the pupil's centre plus `samples.elsewhere`. The points, and the factor at the middle of the window, are computed
+    once.
 
     sines: sines of the points along the axis, minus the sine of the pupil's centre. The array has as many dimensions as
-        the positions for which `at` is called.
+        the array `places` that the method `at` takes.
     """
 
     path: Path
@@ -68,6 +69,8 @@ class AxisFactor:
 
     def at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return amplitude and phase [waves] of the slow factor, relative to its value at the middle of the window.
+
+        The slow factor is the ratio of the diffraction kernel to a Fourier kernel.
 
         places: positions [m] along the axis, relative to the middle of the window, with the dtype of the field `sines`.
         """
@@ -83,8 +86,9 @@ class AxisFactor:
         """Points of the pupil, their directions, and the slow factor of each point.
 
         The slow factor is the ratio of the diffraction kernel to a Fourier kernel. Its amplitude and phase are those at
-        the middle of the window. Points are (x, y) [m], directions are sines along x and y relative to the pupil's
-        centre, and the phase is in waves.
+        the middle of the window. Points are (x, y) [m], and the phase is in waves. Directions are the x and y
+        components of the unit vector from the window's middle to a point, minus those of the unit vector to the pupil's
+        centre.
         """
         kind, elsewhere = self.sines.dtype, self.samples.elsewhere
         none = np.zeros((1,) * self.sines.ndim, kind)
@@ -97,13 +101,15 @@ class AxisFactor:
 
 
 def axis_factor(path: Path, samples: HasDirections, axis: int, sines: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the complex factor that `AxisFactor` describes, at positions [m] relative to the middle of the window.
+    """Return the complex slow factor along x (0) or y (1), relative to its value at the middle of the window.
 
-    Like the Fourier kernel along this axis, the factor depends on two numbers only, the position and the sine of a
-    point of the pupil. It can therefore be included in that kernel. Sines are components of the unit vector from the
-    middle of the window to the point.
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel. Like the Fourier kernel along this axis,
+    it depends on two numbers only: the position in the window, and the sine of the direction to a point of the pupil.
+    It can therefore be included in the Fourier kernel. The sine is the component along the axis of the unit vector from
+    the middle of the window to the point. The arrays `sines` and `places` broadcast with each other.
 
-    sines, places: sines, minus the sine of the pupil's centre, and positions along the axis, which broadcast.
+    sines: sines of points, minus the sine of the pupil's centre.
+    places: positions [m] along the axis, relative to the middle of the window.
     """
     sines = sines.reshape((1,) * (places.ndim - sines.ndim) + sines.shape)
     return np.asarray(turned(*AxisFactor(path, samples, axis, sines).at(places), "float64"))
@@ -123,8 +129,9 @@ def axis_kernel(path: Path, samples: SineStack, axis: int, places: np.ndarray, d
 def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.ndarray:
     """Return the diffraction kernel along x (0) or y (1) at all columns or rows of the window, see `axis_kernel`.
 
-    If amplitude and phase of the kernel are smooth, they are computed for only a few points of the pupil and a few
-    positions in the window, and interpolated. The result is a complex array (pupil, column or row, sample).
+    If amplitude and phase of the kernel are smooth, both are computed for only a few points of the pupil and a few
+    positions in the window, and interpolated between these. The result is a complex array (pupil, column or row,
+    sample).
     """
     at, place = samples.at, sample_positions(path.window.shape[1 - axis], path.window.dx)
     if min(len(place), at.shape[1]) <= SMOOTH or not samples.smooth(path.window.half_width):
@@ -157,9 +164,11 @@ class AxisRows:
         self._rows = np.empty((count, self.samples.at.shape[1]), np.result_type(self.dtype, np.complex64))
 
     def at(self, places: np.ndarray) -> np.ndarray:
-        """Return the kernel at some positions along the axis, an array (pupil, position, sample).
+        """Return the diffraction kernel at some positions along the axis of the window, see `axis_kernel`.
 
-        places: indices of these positions among the window's columns or rows.
+        The result is an array (pupil, position, sample of the pupil).
+
+        places: indices of columns of the window if the axis is x, and of rows if it is y.
         """
         if len(self.samples.at) > 1:
             return self._computed(places)

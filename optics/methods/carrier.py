@@ -15,8 +15,8 @@ __all__ = ["on_line", "on_window", "with_sphere"]
 def with_sphere(field: Field, x: Array, y: Array, beam: Beam, problem: Problem, sign: int) -> Field:
     """Return the field times e^{±ik(ρ - z)} at points (x, y) [m].
 
-    ρ is the distance of the point from the pupil's centre, and z the distance between the planes of the pupil and the
-    window. ρ - z is computed as (x² + y²)/(ρ + z).
+    ρ is the distance of the point from the pupil's centre, z the distance between the planes of the pupil and the
+    window, and k the wave number behind the pupil. ρ - z is computed as (x² + y²)/(ρ + z).
 
     sign: sign of the exponent.
     """
@@ -29,13 +29,17 @@ def with_sphere(field: Field, x: Array, y: Array, beam: Beam, problem: Problem, 
 
 
 def on_window(field: Field, beam: Beam, problem: Problem) -> Field:
-    """Return the product of a field over the window and the factor e^{ik(ρ - z)}, see `with_sphere`."""
+    """Return a field over the window times e^{ik(ρ - z)}, the phase factor of a spherical wave, see `with_sphere`.
+
+    ρ is the distance of a point of the window from the pupil's centre, and z the distance between the planes of the
+    pupil and the window. k is the wave number behind the pupil.
+    """
     x, y = problem.window.coordinates(precision(problem.dtype))
     return with_sphere(field, x, y, beam, problem, +1)
 
 
 def on_line(profile: Field, line: RadialProfile | DistinctRadii, beam: Beam, problem: Problem) -> Field:
-    """Return a rotationally symmetric field over the window, interpolated from its values at radii.
+    """Return a rotationally symmetric field over the window, interpolated from the field's values at some radii.
 
     The spherical phase is removed before the interpolation and restored afterwards. Without this phase, the field is as
     smooth as the intensity.

@@ -1,6 +1,6 @@
 """Quadrature nodes in the cells between the knots of spline maps, for derivatives with respect to the maps' samples.
 
-In a cell, the integrand of a derivative is the light behind the pupil, a wave, times one or two cubic polynomials.
+In a cell, the integrand of a derivative is a wave (the light behind the pupil) times one cubic polynomial or two.
 Let t in [-1, 1] be the position across the cell, and z the largest phase difference between the cell's middle and a
 border. The wave then varies at most as fast as e^{izt}, whose Chebyshev coefficients have the modulus 2 |J_k(z)|. A
 rule of n Gauss-Legendre nodes is exact for polynomials up to degree 2n - 1. If the edge of the aperture cuts a cell,
@@ -40,11 +40,12 @@ DEGREES = 96  # number of degrees in this table; coefficients of higher degrees 
 def derivative_cells(
     opening: Aperture, knots: DerivativeKnots, cycles: np.ndarray, tolerance: float
 ) -> PixelatedAperture | None:
-    """Return the opening, divided into cells with the fewest quadrature nodes per cell that are accurate enough.
+    """Return the opening, divided into cells with as few quadrature nodes per cell as accurate derivatives allow.
 
-    The result is None if more than MOST_CELLS cells along a side would be necessary. The derivatives are those of a
-    random functional of the PSF with respect to all samples of the maps. Their relative L2 error is at most NODES_PART
-    times the tolerance. Cells are halved if they would need more than MOST_NODES nodes along a side.
+    These are derivatives of a random functional of the PSF with respect to all samples of maps, which are reliefs,
+    wavefronts or masks. Their relative L2 error is at most NODES_PART times the tolerance. Cells are halved if they
+    would need more than MOST_NODES nodes along a side. The result is None if more than MOST_CELLS cells along a side
+    would be necessary.
 
     cycles: local frequencies [cycles per radius] of the integrand at points that are evenly spread over the opening.
     """
@@ -95,10 +96,11 @@ def _errors(z: np.ndarray, splines: int, cut_share: float) -> np.ndarray:
 
 @lru_cache(maxsize=2)
 def _tails(splines: int) -> np.ndarray:
-    """Return sums of Chebyshev coefficients, each over all degrees from one degree on, as an array (wave, degree).
+    """Return upper bounds on the sum of a wave's Chebyshev coefficients from each degree on, array (wave, degree).
 
-    The coefficients are upper bounds of those of a wave e^{izt} times splines. t in [-1, 1] is the position across a
-    cell, and z half the phase [rad] that the wave gains across the cell. The table WAVES contains the values of z.
+    The wave e^{izt} is multiplied by splines. t in [-1, 1] is the position across a cell, a rectangle between knots of
+    the splines. z is half the phase [rad] that the wave gains across the cell. The table WAVES contains the values of
+    z, one for each wave.
 
     splines: number of splines by which the wave is multiplied.
     """

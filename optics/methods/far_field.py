@@ -1,4 +1,4 @@
-"""The Rayleigh-Sommerfeld integral by Fourier transforms of the light in the pupil, from points to directions.
+"""The Rayleigh-Sommerfeld integral by Fourier transforms, from points of the pupil to directions towards the window.
 
 The window is the part of the sensor plane in which the PSF is computed. The kernel of the integral is a Fourier kernel
 times a factor that varies slowly over the window. With the value of this factor at one point of the window, the
@@ -71,9 +71,8 @@ class FarFieldSampling:
     def plane(self, problem: Problem) -> float:
         """Return the width [m] of the square over which rounding errors are assumed to be evenly spread.
 
-        The power of all rounding errors is a fraction of the power of the light. Their size in the window is estimated
-        from this power and the width, see `Sampling.plane`. The width is one period of the Fourier transform of the
-        pupil's samples.
+        `Sampling.plane` explains how the size of rounding errors follows from this width. The width is one period of
+        the Fourier transform of the pupil's samples.
         """
         return problem.wavelength * problem.distance / self.pupil.dx
 
@@ -152,7 +151,7 @@ def _nodes(problem: Problem, count: int) -> WindowNodes:
 
 
 def _step(error: float) -> float:
-    """Return the difference of phase [rad] between samples of a wave at which interpolation has this error.
+    """Return the phase difference [rad] of neighbouring samples of a wave that leads to this interpolation error.
 
     The wave has the amplitude 1 and is interpolated by eight-point Lagrange polynomials. The difference is at most 1.5.
     """
@@ -182,7 +181,10 @@ def _nodes_needed(problem: Problem, error: float) -> int | None:
 
 @lru_cache(maxsize=len(CHEBYSHEV_NODES))
 def _between(n: int) -> np.ndarray:
-    """Return weights that interpolate from n Chebyshev points to TRIED evenly spaced positions, (point, position)."""
+    """Return weights that interpolate from n Chebyshev points to evenly spaced positions, array (point, position).
+
+    The constant TRIED is the number of positions.
+    """
     return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(n))
 
 
@@ -262,11 +264,11 @@ def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Prec
 def _onto_window(
     parts: tuple[Array, Array], beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision
 ) -> Array:
-    """Return the intensity over the window, a flat array.
+    """Return the intensity over the window, as a flat array.
 
-    Eight-point Lagrange polynomials interpolate the field between samples of the direction cosines.
+    Eight-point Lagrange polynomials interpolate the field between the direction cosines for which it was computed.
 
-    parts: real and imaginary part of the field at these samples, flat arrays.
+    parts: real and imaginary part of the field at these direction cosines, flat arrays.
     """
     import drjit as dr
 

@@ -68,7 +68,7 @@ class WindowNodes:
 
 
 def all_nodes(count: int, half_angle: float) -> WindowNodes:
-    """Return `WindowNodes` that evaluate the slow factor at every node, so that no node is a combination of others.
+    """Return `WindowNodes` that evaluate the slow factor at every node, not only at a few of the nodes.
 
     The slow factor is the ratio of the diffraction kernel to a Fourier kernel.
     """

@@ -35,8 +35,8 @@ MUCH = 0.7  # choice: above this error, the field is unrelated to the exact fiel
 class ParaxialSampling:
     """Samples of a pupil for a paraxial method.
 
-    `model_error` is computed on first access, because this takes longer than choosing the samples and predicting their
-    cost.
+    `model_error` is the relative L2 error of the intensity that the paraxial approximation causes. It is computed on
+    first access, because its computation takes longer than the choice of the samples and the prediction of their cost.
     """
 
     method: str
@@ -58,7 +58,7 @@ class ParaxialSampling:
         return paraxial_integral(u, beam.distance, problem.wavelength, problem.window, curved).intensity
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
+        """Return the width [m] of the square over which rounding errors are assumed to be evenly spread.
 
         `Sampling.plane` explains how the size of rounding errors follows from this width. The width is one period of
         the Fourier transform of the pupil's samples.
@@ -154,10 +154,10 @@ def model_error(problem: Problem, curved: bool) -> float:
 
 
 def _misplaced(problem: Problem) -> float:
-    """Return the relative L2 error of a PSF from Fraunhofer's integral whose spot of light is much too small.
+    """Return the relative L2 error of a PSF from Fraunhofer's integral that hardly overlaps the exact PSF.
 
     For example, a pupil without a lens casts a wide shadow, but the integral yields a small spot. The error follows
-    from the brightness of the spot, relative to that of the exact PSF.
+    from the brightness of the integral's PSF, relative to that of the exact PSF.
     """
     rays, cell = problem.rays, problem.window.dx**2
     assert rays is not None

@@ -57,8 +57,8 @@ class RaySampling:
         The intensity at the pupil is 1.
 
         Raises:
-            NoDerivativesError: derivatives are required on a GPU. On a GPU, Dr.Jit computes derivatives with errors of
-                1e-6 if they use the reciprocal of a float64. The directions of rays are computed from small differences
+            NoDerivativesError: derivatives are required on a GPU. There, Dr.Jit computes reciprocals of float64
+                numbers in derivatives with errors of 1e-6. The directions of rays are computed from small differences
                 between optical paths, and this magnifies the errors to 1e-2.
         """
         import drjit as dr
@@ -77,7 +77,7 @@ class RaySampling:
         return _splat(x, y, dr.select(propagates, weight, 0), problem, types)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
+        """Return the width [m] of the square over which rounding errors are assumed to be evenly spread.
 
         The intensity of rounding errors is their power divided by the area of this square, see `Sampling.plane`. Here,
         the width is infinite, so these errors count as zero. Rounding errors shift rays, but do not scatter light over
@@ -129,7 +129,7 @@ class PinholeSampling:
         return types.Float(padded_for_packets(image))
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
+        """Return the width [m] of the square over which rounding errors are assumed to be evenly spread.
 
         The intensity of rounding errors is their power divided by the area of this square, see `Sampling.plane`. Here,
         the width is infinite, so these errors count as zero. The reason is that all light is in one sample of the
@@ -164,9 +164,10 @@ def geometric(problem: Problem) -> list[RaySampling]:
 def pinhole(problem: Problem) -> list[PinholeSampling]:
     """Return a list with the sampling that puts all light into one sample of the window.
 
-    The list is empty if the pupil's relief consists of pixels. The sample is the mean intensity over a cell, the square
-    around a sample. Samples of the exact PSF are intensities at points, which differ from means over cells if the PSF
-    is small. The predicted error therefore exceeds 100 % for small PSFs, too, and "auto" never chooses this method.
+    The list is empty if the pupil's relief consists of pixels. The value of the sample is the mean
+    intensity over a cell, the square around the sample. Samples of the exact PSF are intensities at points. Even if the
+    exact PSF is smaller than a cell, they differ from the mean. The predicted error therefore always exceeds 100 %, and
+    "auto" never chooses this method.
     """
     if problem.pixelated is not None:
         return []
@@ -193,7 +194,7 @@ def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, 
 
 
 def _splat(x: Array, y: Array, weight: Array, problem: Problem, types: Precision) -> Array:
-    """Return the sum of the weights that land in each cell of the window, divided by the area of a cell, flat.
+    """Return a flat array with the sum of the weights that land in each cell of the window, divided by a cell's area.
 
     A quadratic B-spline spreads each weight over 3 x 3 cells. The nine parts add up to the weight, so power is lost
     only beyond the rim of the window.
@@ -231,9 +232,9 @@ def _ray_error(problem: Problem) -> float:
     """Return the relative L2 error of an intensity that is computed from the density of rays.
 
     Rays lack the fringes of diffraction along the rim of the shadow. The intensity is therefore wrong in a strip
-    along this rim. The strip is as wide as a Fresnel zone plus a cell of the window, over which a ray is spread. The
-    error exceeds 1 if rays cross, if a mask scatters light, or if the rays hit so small an area that diffraction or the
-    size of a cell determines the spot.
+    along this rim. The strip is as wide as a Fresnel zone plus a cell of the window, because each ray is spread over
+    cells. The error exceeds 1 if rays cross, if a mask scatters light, or if the rays hit so small an area that
+    diffraction or the size of a cell determines the spot.
 
     Let m be the magnification of the rays, the size of the shadow divided by that of the pupil. The fringes are then m
     times as large as the fringes that the pupil would have at the distance z/m without a lens. The reason is that a

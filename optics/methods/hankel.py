@@ -1,4 +1,7 @@
-"""The angular spectrum of a rotationally symmetric pupil by two Hankel transforms, usually the fastest exact method.
+"""Propagation from a rotationally symmetric pupil by two Hankel transforms, to the angular spectrum and back.
+
+This is usually the fastest exact method. The first transform yields the angular spectrum S from the light P behind the
+pupil, and the second yields the field U from S:
 
     S(f) = 2π ∫ P(r) J₀(2πfr) r dr,   U(x) = 2π ∫ S(f) e^{ikz (cos θ - 1)} J₀(2πfx) f df,   f = sin θ / λ
 
@@ -43,11 +46,14 @@ LOOSE = 1e-8
 
 @dataclass(frozen=True)
 class HankelSampling:
-    """Gauss-Legendre nodes in r and in θ, and the radii at which the image is computed.
+    """Quadrature nodes for two Hankel transforms, and the radii at which the light in the window is computed.
+
+    The Gauss-Legendre nodes of the first transform are radii r in the pupil. Those of the second transform are angles θ
+    between the axis and the plane waves of the angular spectrum.
 
     radii: numbers of nodes in r, for each open ring of the aperture.
     angles: number of nodes in θ.
-    line: radii at which the image is computed.
+    line: radii at which the light in the window is computed.
     """
 
     taper: Taper
@@ -71,11 +77,10 @@ class HankelSampling:
         return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
+        """Return the width [m] of the square over which rounding errors are assumed to be evenly spread.
 
-        The power of all rounding errors is a fraction of the power of the light. Their size in the window follows from
-        this power and the width, see `Sampling.plane`. The width is twice the sum of the pupil's radius and of the
-        largest radius at which the image is computed.
+        `Sampling.plane` explains how the size of rounding errors follows from this width. The width is twice the sum of
+        the pupil's radius and of the largest radius at which the light in the window is computed.
         """
         return 2 * (self.line.radius + problem.radius)
 
@@ -123,7 +128,10 @@ def _round_up(n: int) -> int:
 
 
 def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision) -> Field:
-    """Return the field at the radii of `how.line`, without the carrier e^{ikz} of a plane wave."""
+    """Return the field in the window's plane at the radii `how.line.positions`, without the factor e^{ikz}.
+
+    This factor is the phase of a plane wave that travels the distance z from the pupil to the window.
+    """
     import drjit as dr
 
     nodes, weights = _on_rings(problem.aperture.rings, how.radii)

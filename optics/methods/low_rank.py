@@ -41,10 +41,10 @@ class LowRankSampling:
 
     rank: number of Chebyshev points along each axis of the window, between which the factor is interpolated.
     half_width: distance [m] from the window's centre, along each axis, within which these points lie.
-    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c} between points ξ of the pupil and u of the window. The
-        samples may instead be evenly spaced in their sines s, the x and y components of the unit vectors from the
-        window's centre to the samples, minus the sines of the pupil's centre. The kernel is then e^{-ik s·u}, and
-        `scale` is 1.
+    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c} between points ξ of the pupil and u of the window. It is 1
+        if the samples are evenly spaced in sines instead of positions. The kernel is then e^{-ik s·u}. The sines of a
+        point are the x and y components of the unit vector from the window's centre to the point, and s is the
+        difference between the sines of a sample and those of the pupil's centre.
     """
 
     pupil: PupilSamples
@@ -66,7 +66,7 @@ class LowRankSampling:
         return on_window(_low_rank(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
+        """Return the width [m] of the square over which rounding errors are assumed to be evenly spread.
 
         The power of all rounding errors is a fraction of the power of the light. Their size in the window follows from
         this power and the width, see `Sampling.plane`. The width is one period of the Fourier transform of the pupil's
@@ -88,12 +88,14 @@ class LowRankSampling:
 def low_rank(problem: Problem) -> Sequence[LowRankSampling | WindowSampling]:
     """Return a list with one sampling, which has the fewest samples of the pupil that meet the tolerance.
 
-    It also has the smallest rank that meets the tolerance: the number of points along each axis of the window between
-    which the slow factor is interpolated. The samples resolve the combined phase of pupil and path. They are evenly
-    spaced in sines, or in positions if even spacing in sines needs too many samples. If the relief consists of pixels,
-    the samples are quadrature nodes within the pixels. At coarse tolerances, the samples only resolve the light that
-    reaches the window (`window_sampling`). The list is empty if the pupil's radius exceeds STEEPEST times the distance
-    to the window, or if there would be too many samples or too large matrices.
+    The sampling also has the smallest rank that meets the tolerance. The rank is the number of points along each axis
+    of the window between which the slow factor, the ratio of the diffraction kernel to a Fourier kernel, is
+    interpolated. The samples resolve the combined phase of pupil and path. They are evenly spaced in sines, the x and y
+    components of unit vectors from the window's centre to the samples. If this needs too many samples, they are evenly
+    spaced in position. If the relief consists of pixels, the samples are quadrature nodes within the pixels.
+    At coarse tolerances, the samples only resolve the light that reaches the window (`window_sampling`). The list is
+    empty if the pupil's radius exceeds STEEPEST times the distance to the window, or if there would be too many samples
+    or too large matrices.
     """
     coarse = window_sampling(problem)
     if coarse is not None:
@@ -153,10 +155,11 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
     distance c = `how.scale`. G varies slowly with x, so the Lagrange polynomials L_a and L_b interpolate it between the
     points (x_a, y_b) of the window.
 
-    For each axis, the sum over the interpolation points and the sum over the samples become one sum, over pairs of a
-    point and a sample. The field is then the product of three matrices, A_y W A_xᵀ. W contains P G, and A_x and A_y
-    contain the remaining factors along their axis. A_x does not change if window and samples are both mirrored, so the
-    matrices are split into even and odd parts along x. This halves the cost of the product with W.
+    For each axis, the double sum over interpolation points and samples is written as one sum, over all pairs that
+    consist of an interpolation point and a sample. The field is then the product of three matrices, A_y W A_xᵀ.
+    W contains P G, and A_x and A_y contain the remaining factors along their axis. A_x does not change if window and
+    samples are both mirrored, so the matrices are split into even and odd parts along x. This halves the cost of the
+    product with W.
     """
     window = problem.window
     nodes = how.half_width * chebyshev_points(how.rank)
@@ -198,12 +201,12 @@ def _unfolded(parts: list[tuple[Array, Array]], window: Grid, types: Precision) 
 
 
 def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> list[tuple[Array, Array]]:
-    """Return the sum and the difference of the matrix W and its mirror image, W[row, col] ± W[row, -col].
+    """Return W[row, col] ± W[row, -col], the sum and the difference of a matrix W and its left-right mirror image.
 
     W contains the light P(ξ, η) at the samples of the pupil, times the slow factor G(ξ, η; x_a, y_b), the ratio of the
     diffraction kernel to a Fourier kernel (see `_low_rank`). Each row stands for a pair (b, η): an interpolation point
     y_b of the window, and the y coordinate η of a sample. Each column stands for a pair (a, ξ): an interpolation point
-    x_a of the window, and the x coordinate ξ of a sample. Columns are counted from the middle.
+    x_a of the window, and the x coordinate ξ of a sample. Columns are counted from the middle column of W.
 
     Sum and difference are two tensors (row, column) each, the real and the imaginary part.
     """
@@ -223,7 +226,10 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
 
 
 def _entries(u: Field, at: tuple[Array, Array], beam: Beam, problem: Problem, how: LowRankSampling) -> Field:
-    """Return entries of the matrix W that `_kernel` defines, the pupil's light times the slow factor.
+    """Return entries of the matrix W that `_kernel` defines.
+
+    An entry is the light at a sample of the pupil times the slow factor, the ratio of the diffraction kernel to a
+    Fourier kernel.
 
     at: indices (column, row) of the entries, as float64.
     """

@@ -13,14 +13,17 @@ __all__ = ["Sampling", "WithField"]
 
 
 class WithField(Protocol):
-    """Interface of samplings that can also compute the complex field: all exact methods except "far_field"."""
+    """Interface of samplings that can compute the complex field, not only the intensity.
+
+    The samplings of all exact methods except "far_field" have this interface.
+    """
 
     def field(self, beam: Beam, problem: Problem) -> Field:
         """Return the field for unit amplitude at the pupil, without the carrier e^{ikz} of a plane wave."""
 
 
 class Sampling(Protocol):
-    """Samples with which one method solves a problem.
+    """Plan of one method for the propagation from a pupil to a window: samples of the pupil, and predicted cost.
 
     `seconds` is the predicted time on two cores, without the time of compilation.
     """
@@ -35,7 +38,8 @@ class Sampling(Protocol):
     def samples(self) -> tuple[int, int]:
         """Numbers of samples of the pupil along y and along x.
 
-        For quadrature nodes, the value is (radial nodes, angular nodes) or (number of nodes, 1) instead.
+        If the samples are no grid, the value is (number of samples, 1). For the method "hankel", it is (number of radii
+        in the pupil, number of angles in the spectrum).
         """
 
     @property
@@ -47,7 +51,7 @@ class Sampling(Protocol):
 
     @property
     def bytes(self) -> float:
-        """Predicted memory of the method at its peak, without the arrays of the window (`window_cost`)."""
+        """Predicted peak memory of the propagation, without the arrays over the window that `window_cost` counts."""
 
     @property
     def model_error(self) -> float:
@@ -57,9 +61,9 @@ class Sampling(Protocol):
         """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
+        """Return the width [m] of the square over which rounding errors are assumed to be evenly spread.
 
-        The square lies in the plane of the window. The power of all rounding errors is a fraction of the power of all
-        light, which depends on the number type. Spread evenly over the square, it has the intensity power / width².
-        Within the window, rounding errors are therefore smaller if the square is wider.
+        The square lies in the plane of the window. The total power of rounding errors is the power of all light times
+        a number that depends on the number type. The intensity of rounding errors is taken to be this total power
+        divided by width². Within the window, rounding errors are therefore smaller if the square is wider.
         """

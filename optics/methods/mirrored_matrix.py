@@ -1,8 +1,8 @@
 """Faster products with matrices that do not change if rows and columns are both mirrored.
 
 The cost of such a product is halved. The Fourier kernel of a window about the axis is such a matrix: each entry depends
-on a position in the window times the sine of the direction of a sample of the pupil. This number does not change if
-position and sine both change their signs.
+only on the product of a position in the window and the sine of the direction of a sample of the pupil. The product does
+not change if position and sine both change their signs.
 """
 
 from __future__ import annotations
@@ -76,6 +76,12 @@ class MirroredMatrix:
 
 
 def _split(matrix: np.ndarray, half: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the middle row, if any, the rows after it, and the rows before it in the reverse order."""
+    """Return three parts of a matrix: its middle row, the rows after the middle, and the rows before the middle.
+
+    Only the third part is in reverse order. The first part is empty if the number of rows is even.
+
+    matrix: array (..., row, column).
+    half: number of rows after the middle.
+    """
     count = matrix.shape[-2]
     return matrix[..., half : count - half, :], matrix[..., count - half :, :], matrix[..., :half, :][..., ::-1, :]

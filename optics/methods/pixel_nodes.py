@@ -1,13 +1,14 @@
 """Quadrature nodes within the pixels of a stepped relief, for the method "low_rank" at coarse tolerances.
 
-Light of a node is multiplied by the Fourier kernel e^{-ik s·u}, with u a position in the window. For pupils without
-pixels, s contains the sines of a sample, the components of the unit vector from the window's centre to the sample (see
-`sine_samples`). Here, s is the position of the node divided by the distance of the window's plane, because the borders
-of pixels are straight lines in position, but not in sines. The Fourier kernel with this s differs more from the
-diffraction kernel than the one with sines. Factors along x and along y (`axis_kernel`) correct most of the difference.
+Light of a node is multiplied by the Fourier kernel e^{-ik s·u}. u is a position in the window, and s a direction. For
+pupils without pixels, s contains the sines of a sample, the components of the unit vector from the window's centre to
+the sample (see `sine_samples`). Here, s is the position of the node divided by the distance of the window's plane,
+because the borders of pixels are straight lines in position, but not in sines. With this s, the Fourier kernel is a
+worse approximation to the diffraction kernel than with sines. It is therefore multiplied by a factor that depends on x
+and one that depends on y (`axis_kernel`), which correct most of the difference.
 
-The number of nodes in a pixel follows from the phase of the path through lens and wavefront to the window. It is
-sufficient on average over the points of the window, because a relief may send light to any of them.
+The number of nodes in a pixel follows from the phase that lens, wavefront and the path to the window cause. The error
+is averaged over the points of the window, because a relief may send light to any of these points.
 """
 
 from __future__ import annotations
@@ -53,14 +54,14 @@ POINTS = 40  # choice: number of points of the pupil that determine the rank
 class PixelNodes:
     """Quadrature nodes of a pupil of pixels, as a replacement for `SineSamples` in sums over the pupil.
 
-    `SineSamples` describes a sample by its sines, the components of a unit vector. Here, the direction of a node, its
-    position divided by the distance of the window's plane, takes the place of the sines.
+    `SineSamples` describes a sample by its sines, the components of a unit vector. Here, the direction of a node takes
+    the place of the sines. The direction is the node's position divided by the distance of the window's plane.
 
     nodes: positions and weights of the nodes.
     centre: centre (x, y) [m] of the window.
     distance: distance [m] of the window's plane.
-    elsewhere: a fixed direction, computed from the radius and the distance. `axis_kernel.AxisFactor`, a factor of the
-        kernel along x or y, is computed for points of the pupil that have this direction along the other axis.
+    elsewhere: root mean square of the directions over the pupil. `axis_kernel.AxisFactor` computes a factor of the
+        kernel along x for points of the pupil whose direction along y is this value, and vice versa.
     """
 
     nodes: PixelSamples
@@ -73,7 +74,7 @@ class PixelNodes:
 
     @property
     def at(self) -> np.ndarray:
-        """Positions of the nodes divided by `distance` (their directions), the same along x and along y."""
+        """Directions of the nodes, which are their positions along one axis (x or y) divided by `distance`."""
         return self.nodes.at / self.distance
 
     @property
@@ -120,10 +121,11 @@ class PixelNodes:
 
 @dataclass(frozen=True, eq=False)
 class PixelStack(SineStack):
-    """A stack that contains one pupil, whose relief consists of pixels, for code that expects a `SineStack`.
+    """A single pupil, whose relief consists of pixels, in the form of a `SineStack`.
 
-    A `SineStack` describes samples of pupils by their sines, the components of unit vectors from the window's centre.
-    Here, the directions of the nodes (position divided by the window's distance) take the place of the sines.
+    A `SineStack` represents several pupils. It describes each sample of a pupil by the sample's sines, the components
+    of the unit vector from the window's centre to the sample. Here, the direction of a node takes the place of the
+    sines. The direction is the node's position divided by the window's distance.
 
     nodes: positions and weights of the nodes.
     """
@@ -161,7 +163,10 @@ class PixelStack(SineStack):
 
 @cached_arrays(MOST_BYTES, lambda layout: sum(part.nbytes for part in layout))
 def _layout(nodes: PixelSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return `PixelNodes.layout`, which many pupils share."""
+    """Return the coordinates x and y [m] of the nodes, and their weights [m²], three arrays (row, column).
+
+    The arrays are cached, because many pupils have the same nodes.
+    """
     x, y = np.meshgrid(nodes.at, nodes.at)
     return read_only(x), read_only(y), read_only(nodes.aperture.weights(nodes.across) * nodes.radius**2)
 
@@ -212,10 +217,10 @@ def pixel_plan(problem: Problem) -> PixelPlan | None:
 
 
 def _across(problem: Problem) -> int | None:
-    """Return the number of nodes along a pixel with which the mean error of integrals over pixels is small enough.
+    """Return the smallest number of quadrature nodes along a pixel's side that makes the mean error small enough.
 
-    Pixels that the edge of the aperture cuts have larger errors, see `_squared_errors`. The result is None if
-    MOST_NODES or more nodes would be necessary.
+    This is the error of integrals over pixels. It is larger for pixels cut by the edge of the aperture than for whole
+    pixels, see `_squared_errors`. The result is None if MOST_NODES or more nodes would be necessary.
     """
     assert problem.pixelated is not None
     level = problem.stack.level
@@ -253,11 +258,12 @@ def _squared_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(maxsize=64)
 def _rank(pupil: PixelNodes, path: Path, tolerance: float, least: int) -> int | None:
-    """Return the number of points per axis of the window (rank) that interpolate the slow factor accurately enough.
+    """Return the rank, the number of interpolation points that are necessary along each axis of the window.
 
-    The slow factor is the ratio of the diffraction kernel to a Fourier kernel. Here, this ratio is divided by its own
-    values along the x axis and along the y axis of the window. The root mean square error of the interpolation over
-    pupil and window must be a small part of the tolerance. The result is None if this takes too many points.
+    The slow factor, the ratio of the diffraction kernel to a Fourier kernel, is interpolated between these points.
+    Here, this ratio is divided by its own values along the x axis and along the y axis of the window. The root mean
+    square error of the interpolation over pupil and window must be a small part of the tolerance. The result is None if
+    this takes too many points.
 
     least: smallest rank.
     """

@@ -1,8 +1,9 @@
-"""The angular spectrum of a pupil of pixels. Sums over nodes within pixels replace the transform of a grid.
+"""The angular spectrum of a pupil of pixels, as a sum over quadrature nodes within the pixels.
 
+For other pupils, the spectrum is the Fourier transform of samples on a grid (`angular_spectrum`).
 To compute the spectrum up to a given frequency, the nodes must resolve this frequency within each pixel. Jumps between
 pixels also diffract light to higher frequencies, which the nodes need not resolve. All further steps are the same as
-for other pupils (`angular_spectrum`).
+for other pupils.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ __all__ = ["PixelSpectrum", "split_pixel_spectrum", "whole_pixel_spectrum"]
 
 @dataclass(frozen=True)
 class PixelSpectrum(SpectrumSampling):
-    """Spectrum of a pupil of pixels, with nodes that are fitted to the pixels."""
+    """Sampling of the angular spectrum of a pupil of pixels, computed from quadrature nodes in each pixel."""
 
     method: str
     pupil: PixelSamples

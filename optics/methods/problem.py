@@ -52,15 +52,15 @@ class Problem:
     window, tolerance: grid of the output, and allowed relative L2 error of the intensity over this grid.
     symmetric, even: True if the light behind the pupil is rotationally symmetric, or even in x and in y.
     widest_band: frequency [1/m] beyond which methods may omit light; infinite if they must not omit any.
-    reach: distance [m] from the axis beyond which the light is negligible, a fraction of the tolerance. Samples farther
-        out may be wrong, and diffraction by the edge may be less accurate. None: the whole window must be accurate.
+    reach: distance [m] from the axis within which all light lies, except for a fraction of the tolerance. Samples
+        beyond may be wrong, and diffraction by the edge may be less accurate. None: the whole window must be accurate.
     medium_n: refractive index behind the pupil.
     masked: True if a mask scatters light where no rays arrive. Approximate methods then cannot predict their error.
     spread: mean square distance of the light from the axis along one direction, in squared radii (`light_spread`).
     differentiated: True if the PSF carries derivatives.
     moves, resized: True if derivatives with respect to the distance or the radius, respectively, are requested.
     knots: rectangles (cells) of the pupil, between the rows and columns of samples of a relief, wavefront or mask.
-        Derivatives with respect to these samples require them. None: no such derivatives are requested.
+        The rectangles are needed for derivatives with respect to these samples. None: there are no such derivatives.
     detail_part: phase [rad] below which fine detail of the pupil is neglected, divided by the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even if the window needs fewer samples.
     steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Methods then remove light
@@ -106,8 +106,8 @@ class Problem:
         fixed: the same light without derivatives. It is necessary if the beam carries tensors of PyTorch.
 
         Raises:
-            ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], the dtype is invalid, or a
-                tensor of PyTorch requires a gradient without `fixed`.
+            ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], the dtype is invalid, or
+                `fixed` is None although a tensor of PyTorch requires a gradient.
         """
         distance = positive("sensor_distance", beam.distance, carried=True)
         tolerance = in_range("tolerance", tolerance, 1e-12, 0.5)
@@ -132,17 +132,17 @@ class Problem:
 
     @cached_property
     def slopes(self) -> Slopes:
-        """Gradient of the optical path across the pupil, on a grid that resolves its height profile and wavefront."""
+        """Gradient of the optical path across the pupil, on a grid that resolves the pupil's relief and wavefront."""
         return self.light.pupil.slopes(self.light.wavelength, self.light.source)
 
     @cached_property
     def detail(self) -> float:
-        """Frequency [1/m] above which components of phase [rad] and mask are below `detail_part` times tolerance."""
+        """Frequency [1/m] above which no Fourier component of phase [rad] or mask exceeds `detail_part` · tolerance."""
         return self.light.pupil.bandwidth(self.light.wavelength, self.detail_part * self.tolerance)
 
     @cached_property
     def other_detail(self) -> float:
-        """Value of `detail` for the pupil without its maps (relief, wavefront, mask) that carry derivatives."""
+        """Value of `detail` for the pupil without those maps (relief, wavefront, mask) that carry derivatives."""
         assert self.knots is not None
         others = self.knots.without_maps(self.light.pupil)
         return others.bandwidth(self.light.wavelength, DETAIL_PART * self.tolerance)
@@ -154,17 +154,17 @@ class Problem:
 
     @property
     def phase_band_inside(self) -> float:
-        """Highest frequency [1/m] of the phase over the pupil's disk, without the soft edge, which may be steeper."""
+        """Highest spatial frequency [1/m] of the phase over the pupil's disk, without the soft edge around the disk."""
         return SLOPE_MARGIN * self.slopes.steepest_inside / self.light.wavelength + self.detail
 
     @cached_property
     def turning(self) -> float:
-        """Largest phase gradient [cycles/m] across the pupil of whole paths to any point of the window."""
+        """Largest gradient [cycles/m] across the pupil of the phase of paths from source to points of the window."""
         return self._turning[0]
 
     @cached_property
     def turning_inside(self) -> float:
-        """Value of `turning` for the pupil's disk alone. `turning` also includes the soft edge around the disk."""
+        """Largest phase gradient [cycles/m] like `turning`, but over the pupil's disk without the soft edge."""
         return self._turning[1]
 
     @cached_property
@@ -181,10 +181,10 @@ class Problem:
         return Rays.from_slopes(self.slopes, self.aperture, self.distance, self.medium_n)
 
     def cells(self, band: float | None = None) -> PixelatedAperture | None:
-        """Return the aperture, divided into rectangles (cells) that contain quadrature nodes; None for too many cells.
+        """Return the aperture, divided into cells with quadrature nodes, or None if too many cells would be necessary.
 
         band: highest frequency [1/m] of the light's spectrum, if this spectrum is computed from the nodes. None: the
-            nodes resolve the phase of paths through the pupil to all points of the window.
+            nodes resolve the phase of the light from points of the pupil when it arrives at any point of the window.
         """
         assert self.knots is not None
         slopes = self._turning_slopes if band is None else self._slopes
@@ -194,17 +194,17 @@ class Problem:
 
     @cached_property
     def _slopes(self) -> np.ndarray:
-        """Slopes of the wavefront in the pupil and up to `_beyond_rim` outside its rim, see `Slopes.spread`."""
+        """Slopes of the wavefront over the pupil and a ring of width `_beyond_rim` around it, see `Slopes.spread`."""
         return self.slopes.spread(self._beyond_rim)
 
     @cached_property
     def _turning_slopes(self) -> np.ndarray:
-        """Slopes like `_slopes`, but of whole paths to the window; upper bounds for all points of the window."""
+        """Upper bounds on the slopes of paths from source to any point of the window, over the area of `_slopes`."""
         return self.slopes.spread(self._beyond_rim, (self.window, self.distance, self.medium_n))
 
     @property
     def _beyond_rim(self) -> float:
-        """Largest distance [radii] of nodes beyond the pupil's rim: the diagonal of the largest of its `cells`."""
+        """Upper bound [radii] on distances of quadrature nodes beyond the pupil's rim: the largest cell's diagonal."""
         assert self.knots is not None
         return math.sqrt(2) * max(after - before for before, after in pairwise(self.knots.borders))
 
@@ -220,7 +220,7 @@ class Problem:
 
     @property
     def ripple(self) -> float:
-        """Allowed amplitude error of the aperture's spectrum due to its edge, which is softened to save samples."""
+        """Amplitude error that the aperture's spectrum may have because the aperture's edge is softened."""
         return self.tolerance * (EDGE_RIPPLE_PER_TOLERANCE if self.reach is None else BRIGHT_EDGE_RIPPLE_PER_TOLERANCE)
 
     @property
@@ -240,7 +240,7 @@ class Problem:
 
     @property
     def waves(self) -> float:
-        """Upper bound [waves] on all phases: (longest path - distance)/λ + radius · `phase_band_inside`."""
+        """Upper bound [waves] on phases: (longest pupil-to-window path - distance)/λ + radius · `phase_band_inside`."""
         reach = self.radius + self.window.half_diagonal
         path = reach**2 / (math.hypot(reach, self.distance) + self.distance) / self.wavelength
         return path + self.radius * self.phase_band_inside
@@ -265,7 +265,7 @@ class Problem:
         return PupilEdge(self.aperture.soften(stepped_up(band * self.radius), self.ripple, EDGE_REACH), self.radius)
 
     def band(self, margin: float = 0.0) -> float:
-        """Return the highest frequency [1/m] of the pupil's light that can land within `margin` [m] of the window."""
+        """Return the highest frequency [1/m] at which the pupil's light can land within `margin` [m] of the window."""
         edge = 0.0 if self.steep else EDGE_REACH
         reach = (1 + edge) * self.radius + self.outermost + margin
         return min(self.widest_band, reach / math.hypot(reach, self.distance) / self.wavelength)

@@ -1,4 +1,4 @@
-"""The soft edge of an aperture, scaled to the radius of a pupil."""
+"""An aperture with a soft edge, whose lengths are converted from radii of the pupil to metres."""
 
 from __future__ import annotations
 

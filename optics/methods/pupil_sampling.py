@@ -1,6 +1,7 @@
-"""Samples of the pupil for matrix products: a grid with a softened edge, or nodes within pixels.
+"""Samples of the pupil: a grid for an aperture whose edge is softened, or quadrature nodes within an aperture's pixels.
 
-In both cases, the samples form rows and columns, with the same positions along x and along y.
+In both cases, the samples form rows and columns, with the same positions along x and along y. Diffraction integrals
+over such samples can be computed as matrix products.
 """
 
 from __future__ import annotations
@@ -103,11 +104,11 @@ class PixelSamples:
 
     @property
     def outermost(self) -> float:
-        """Distance from the axis [m] beyond which all nodes have the weight 0.
+        """Distance from the axis [m] beyond which all quadrature nodes have the weight 0.
 
-        It is the pupil's radius plus the diagonal of the aperture's widest pixel. The reason is that pixels that the
-        edge of the aperture cuts also have nodes outside the aperture. Sums over a pixel's nodes are nevertheless
-        integrals over the open part of the pixel only.
+        It is the pupil's radius plus the diagonal of the aperture's widest pixel. A pixel that is partly outside the
+        aperture has nodes outside it, too, with weights other than 0. The weights are such that sums over the pixel's
+        nodes are integrals over its open part.
         """
         return self.radius * (1 + math.sqrt(2) * self.aperture.widest)
 

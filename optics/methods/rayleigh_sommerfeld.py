@@ -55,7 +55,8 @@ class NodeSampling:
 
     Sums over the nodes are accurate to `digits` decimal digits if the integrand has at most `cycles` cycles per radius.
 
-    line: radii at which a rotationally symmetric image is computed; None if it is computed at every sample.
+    line: radii at which a rotationally symmetric image is computed. None if the image is computed at every sample of
+        the window.
     """
 
     aperture: Aperture
@@ -89,12 +90,12 @@ class NodeSampling:
         return on_line(direct_sum(beam, self.rule, r, 0 * r, types), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of a square in the window's plane, from which the size of rounding errors follows.
+        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
 
-        The power of all rounding errors is a fraction of the power of the light. It is taken as spread evenly over this
-        square (see `Sampling.plane`). The width is in proportion to the width λz/R of a focus, where z is the distance
-        of the window and R the radius of the pupil. It is also in proportion to the square root of the number of nodes,
-        because the rounding errors of the summands are independent.
+        The power of all rounding errors is a fraction of the power of the light. `Sampling.plane` explains how their
+        size in the window follows from this power and the width. The width is in proportion to the width λz/R of a
+        focus, where z is the distance of the window and R the radius of the pupil. It is also in proportion to the
+        square root of the number of nodes, because the rounding errors of the summands are independent.
         """
         return problem.wavelength * problem.distance / problem.radius * math.sqrt(self.count / math.pi)
 
@@ -134,7 +135,7 @@ def nodes(problem: Problem) -> list[NodeSampling]:
 
 
 def node_rule(problem: Problem) -> tuple[float, float]:
-    """Return the cycles per radius that a quadrature rule must resolve, and the digits that it must provide."""
+    """Return the cycles per pupil radius that a quadrature rule must resolve, and the digits it must provide."""
     digits = min(SPARE_DIGITS - math.log10(problem.tolerance), MOST_DIGITS)
     cycles = turns(problem, digits)
     # Rounding up limits the number of different rules. For pixels, there are few different rules anyway.
@@ -156,9 +157,9 @@ def turns(problem: Problem, digits: float) -> float:
 
 
 def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
-    """Return the number of nodes of a quadrature rule.
+    """Return the number of nodes of a quadrature rule for an integrand with up to `cycles` cycles per pupil radius.
 
-    Beyond a hundred cycles, it is extrapolated in proportion to the square of the cycles.
+    For more than a hundred cycles, the number for a hundred is multiplied by the square of `cycles` / 100.
     """
     most = 100.0
     counted = aperture.node_count(min(cycles, most), digits)
@@ -170,7 +171,7 @@ def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
 def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool = False) -> Nodes:
     """Return the quadrature nodes of an aperture, from a cache if possible.
 
-    cycles: largest number of cycles per radius of the integrand.
+    cycles: highest spatial frequency of the integrand [cycles per pupil radius].
     digits: number of decimal digits to which sums over the nodes are accurate.
     halved: True to return only the nodes on one side of the x axis, for mirror-symmetric pupils and points on the x
         axis. Both sides then contribute the same, so the weights of nodes off the axis are doubled.
@@ -181,7 +182,7 @@ def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool 
 
 
 def _made(aperture: Aperture, cycles: float, digits: float, halved: bool) -> Nodes:
-    """Return newly computed nodes of an aperture. `cached_nodes` explains the arguments and keeps the results."""
+    """Return quadrature nodes of an aperture that are not in the cache. `cached_nodes` explains the arguments."""
     found = aperture.nodes(cycles, digits)
     if not halved:
         return found
@@ -208,11 +209,12 @@ def _intensity_band(problem: Problem) -> float:
 def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> Field:
     """Return the first Rayleigh-Sommerfeld integral at points (x, y) [m].
 
-    U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ik(D - z)} dξ (Goodman, §3.5), where d = |x - ξ| and D = √(d² + z²). The path
-    D - z is computed as d²/(D + z). Whole waves of the phase are subtracted in float64.
+    U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ik(D - z)} dξ (Goodman, §3.5), where d = |x - ξ| and D = √(d² + z²). The
+    difference D - z is computed as d²/(D + z). The phase is computed in float64, and whole multiples of 2π are
+    subtracted before it is rounded to the type of the result.
 
-    rule: the arguments of `cached_nodes`: the aperture, the cycles per radius that its nodes must resolve, the decimal
-        digits to which their sum must be accurate, and True if only the nodes on one side of the x axis are summed.
+    rule: aperture, `cycles`, `digits` and `halved`, the arguments with which `cached_nodes` returns the quadrature
+        nodes.
     """
     import drjit as dr
 
@@ -229,7 +231,9 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
 def _added(
     beam: Beam, rule: tuple[np.ndarray, ...], at: tuple[Array, Array], total: tuple[Array, Array], types: Precision
 ) -> tuple[Array, Array]:
-    """Return real and imaginary part of `total` plus the sum over some nodes, float64.
+    """Return `total` plus the part of the integral of `direct_sum` that is summed over given nodes.
+
+    The result is the real and the imaginary part, in float64.
 
     rule: x, y and weight of the nodes, in units of the pupil's radius.
     at: points (x, y) [m] of the image.

@@ -37,19 +37,27 @@ class Rays:
 
     @cached_property
     def most(self) -> np.ndarray:
-        """Largest magnification at each ray: the larger singular value of the gradient of (to_x, to_y) by (x, y)."""
+        """Largest magnification at each ray, over all directions in the aperture.
+
+        It is the larger singular value of the Jacobian matrix of the map from a point of the aperture to the point that
+        the ray hits.
+        """
         root = np.sqrt(np.maximum(np.square(self.norm) - np.square(self.determinant), 0))
         found: np.ndarray = np.sqrt(self.norm + root)
         return found
 
     @cached_property
     def least(self) -> np.ndarray:
-        """Smallest magnification at each ray: the smaller singular value of the gradient of (to_x, to_y) by (x, y)."""
+        """Smallest magnification at each ray, over all directions in the aperture.
+
+        It is the smaller singular value of the Jacobian matrix of the map from a point of the aperture to the point
+        that the ray hits.
+        """
         return np.abs(self.determinant) / np.maximum(self.most, 1e-30)
 
     @classmethod
     def from_slopes(cls, slopes: Slopes, aperture: Aperture, distance: float, medium_n: float) -> Rays:
-        """Return the rays that propagate (sine of the angle below 1).
+        """Return the rays that propagate, those for which the sine of the angle between ray and axis is below 1.
 
         Let p be the local slope of the wavefront, already divided by the index of the medium. The angle θ between the
         ray and the axis then satisfies tan θ = p/√(1 - p²).
@@ -72,7 +80,7 @@ class Rays:
 
     @property
     def folded(self) -> bool:
-        """True if several rays may reach the same point of the plane."""
+        """True if several rays may reach the same point of the plane behind the aperture."""
         return len(self) > 0 and float(np.sign(self.determinant.min())) < float(np.sign(self.determinant.max()))
 
     @property
@@ -95,8 +103,9 @@ class Rays:
     def some(self, most: int) -> Rays:
         """Return `most` evenly spread rays, or all rays if there are fewer.
 
-        The index advances in steps of the golden section, so that the selected rays do not align with the rows of the
-        grid.
+        From one selected ray to the next, the position in the list of rays advances by 0.618 of the list's length (the
+        golden section), and continues at the start after the end. The selected rays therefore do not align with the
+        rows of the grid.
         """
         turns = (np.arange(min(most, len(self))) + 0.5) * (math.sqrt(5) - 1) / 2
         chosen = ((turns % 1) * len(self)).astype(int) if most < len(self) else slice(None)
@@ -121,8 +130,8 @@ def brightness(area: float, cell: float) -> float:
 
 
 def mismatch(wrong: float, exact: float) -> float:
-    """Return the relative L2 error, with a margin, of a PSF that hardly overlaps the exact PSF.
+    """Return the relative L2 error of a wrong PSF that hardly overlaps the exact PSF, times a safety factor.
 
-    wrong, exact: `brightness` of this PSF and of the exact one.
+    wrong, exact: `brightness` of the wrong and of the exact PSF.
     """
     return MARGIN * math.sqrt(1 + wrong / exact)

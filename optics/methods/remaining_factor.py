@@ -1,11 +1,11 @@
 """The remaining factor of the diffraction kernel, after the parts that depend on x alone or on y alone are removed.
 
-The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel (see `slow_factor`). It has
-two axis factors (see `AxisFactor`). The axis factor along x is the slow factor on the x axis of the window, for light
-from points of the pupil that all have the same sine along y. The axis factor along y is the slow factor on the y axis,
-for light from points that all have the same sine along x. The remaining factor is the slow factor divided by both axis
-factors. All are relative to their values at the middle of the window. The remaining factor varies even more slowly over
-the window than the slow factor.
+The slow factor is the ratio of the diffraction kernel to a Fourier kernel (see `slow_factor`). It has two axis factors
+(see `AxisFactor`), the values of the slow factor on the x axis and on the y axis of the window. A point of the pupil
+has two sines, the x and y components of its direction from the middle of the window. The axis factor along x is
+computed for points with a common sine along y, and the axis factor along y for points with a common sine along x. The
+remaining factor is the slow factor divided by both axis factors. All are relative to their values at the middle of the
+window. The remaining factor varies even more slowly over the window than the slow factor.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ __all__ = ["RemainingFactor"]
 
 @dataclass(frozen=True, eq=False)
 class RemainingFactor:
-    """The diffraction kernel divided by a Fourier kernel and by two factors, of which one depends on x and one on y.
+    """The part of the slow factor that depends on both x and y, for light from given points of pupils to a window.
 
-    The kernel describes light from some points of pupils to a window. The slow factor is the factor by which it differs
-    from a Fourier kernel. The two factors are the slow factor along x and along y (see `AxisFactor`). Intermediate
-    results that do not depend on the position in the window are computed once.
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel. It is divided by two axis factors, its
+    values on the x axis and on the y axis of the window (see `AxisFactor`). Intermediate results that do not depend on
+    the position in the window are computed once.
 
-    directions: x and y components (s, t) of the unit vectors from the middle of the window to the points, minus those
-        of the unit vector to the pupil's centre.
+    directions: x and y components (s, t) of the unit vector from the middle of the window to each point of a pupil,
+        minus the components of the unit vector to the pupil's centre.
     dtype: "float32" or "float64". With "float32", paths are computed in float32, too, if they are short enough.
     """
 
@@ -45,11 +45,11 @@ class RemainingFactor:
     def at(self, window: Pair) -> np.ndarray:
         """Return the complex remaining factor for light that arrives at positions of the window.
 
-        The slow factor is the diffraction kernel divided by a Fourier kernel. The remaining factor is the slow factor
-        divided by two axis factors, the slow factor along x and the slow factor along y (see `AxisFactor`).
+        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. The remaining factor is the slow
+        factor divided by its values at (u, 0) and at (0, v), which are called axis factors (see `AxisFactor`).
 
-        window: positions (u, v) [m] relative to the middle of the window. They have as many dimensions as the
-            attribute `directions`, with which they broadcast.
+        window: positions (u, v) [m] relative to the middle of the window. They have as many dimensions as the attribute
+            `directions`, with which they broadcast.
         """
         window = self.rounded(window[0]), self.rounded(window[1])
         if len({part.shape for part in (*self.directions, *window)}) == 1:
@@ -61,9 +61,10 @@ class RemainingFactor:
         return values.astype(self._kind, copy=False)
 
     def divided(self, window: Pair, along: Sequence[Pair | np.ndarray]) -> np.ndarray:
-        """Return the slow factor divided by given axis factors, which are the slow factor along x and along y.
+        """Return the slow factor at positions (u, v) of the window, divided by the given axis factors.
 
-        The slow factor is the diffraction kernel divided by a Fourier kernel.
+        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. The axis factors are its values at
+        (u, 0) and at (0, v).
 
         window: positions (u, v) [m] relative to the middle of the window, as `rounded` returns them.
         along: amplitude and phase [waves] of the axis factors at u and at v, as `AxisFactor.at` returns them.
@@ -97,12 +98,12 @@ class RemainingFactor:
     def _three(self) -> tuple[Pair, Pair, Pair]:
         """Points of the pupil, their sines, and amplitude and phase of the slow factor at the window's middle.
 
-        The slow factor is the diffraction kernel divided by a Fourier kernel. The sines of a point are the x and y
+        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. The sines of a point are the x and y
         components of the unit vector from the window's middle to the point, minus those of the pupil's centre.
 
-        Each array has the shape (pupil, 3, ...). Its axis 1 counts three cases: the points of this factor, the points
-        of the `AxisFactor` along x, whose sines along y are all the same, and the points of the `AxisFactor` along y,
-        whose sines along x are all the same.
+        Each array has the shape (pupil, 3, ...). Its axis 1 counts three sets of points. The first are the points with
+        the attribute `directions` as sines. The second are those of the `AxisFactor` along x, which have a common sine
+        along y. The third are those of the `AxisFactor` along y, which have a common sine along x.
         """
         _, points, directions = self._pupil
         own, shape = (points, directions, self._middle), directions[0].shape

@@ -42,9 +42,10 @@ def row_blocks(grid: Grid) -> Iterator[tuple[int, Grid]]:
 
 
 def with_rows_moved(spectrum: Field, rows: int, period: Scalar, sign: int) -> Field:
-    """Return the Fourier sum of samples moved by `rows` rows along y, given their sum `spectrum` before the move.
+    """Return the Fourier sum of samples after they are moved by `rows` rows along y.
 
-    period, sign: those of the sum, see `fourier.dft2`.
+    spectrum: Fourier sum of the samples before they are moved.
+    period, sign: arguments of `fourier.dft2`, with which `spectrum` was computed.
     """
     if rows == 0:
         return spectrum

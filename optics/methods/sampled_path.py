@@ -99,7 +99,8 @@ def _interpolated(
 
     values: function of NumPy arrays x and y [m]. It returns an array of the same library (NumPy or PyTorch) as
         `convert`.
-    powers: number of powers of x and of y of a polynomial; None for other functions, which are not interpolated.
+    powers: if `values` is a polynomial, the number of powers of x, which is also the number of powers of y. None for
+        other functions, which are not interpolated.
     """
     many, few = len(samples.at), (powers or 0) + SPHERE_POINTS
     if powers is None or few >= many or isinstance(samples, PixelNodes) or not single_stack(samples).smooth(0.0):
@@ -133,7 +134,7 @@ def _pixel_weights(samples: PixelNodes) -> Any:
 
 @lru_cache(maxsize=64)
 def _few_points(samples: WindowSamples, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return coordinates x and y [m] of Chebyshev points across the samples, each an array (row, column)."""
+    """Return x and y [m] of `count` by `count` Chebyshev points in the samples' area, two arrays (row, column)."""
     ends = samples.at[[0, -1]]
     nodes = ends.mean() + np.diff(ends) / 2 * chebyshev_points(count)
     return samples.points_at(nodes[None, :], nodes[:, None])

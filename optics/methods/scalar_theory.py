@@ -59,10 +59,11 @@ def steepest_sine(radius: float, distance: float, leaving: float) -> float:
 def scalar_theory_error(sine: float, spread: float = ROUND) -> float:
     """Return an upper bound on the relative L2 error of the scalar intensity for rays with sines up to `sine`.
 
-    The bound is valid for light of any polarisation. The window must contain the brightest point of the light and a few
-    samples around it.
+    The bound is valid for light of any polarisation. The intensity must be compared in a window that contains the
+    brightest point of the light and a few samples around it.
 
-    spread: mean square distance of the light from the axis along one direction, in squared radii (`light_spread`).
+    spread: mean square distance between the axis and the points of the pupil from which the light comes, in squared
+        radii. The distance is measured along the direction for which the result is largest (see `light_spread`).
     """
     return MARGIN * spread / ROUND * float(np.interp(sine, *_TABLE)) * min(sine, 1.0) ** 2
 

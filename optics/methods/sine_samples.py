@@ -1,4 +1,4 @@
-"""Samples of a pupil with evenly spaced sines, which are components of directions from the window's centre.
+"""Samples of a pupil that are evenly spaced in sines, the components of directions from the window's centre.
 
 The sines of a point are the x and y components of the unit vector from the window's centre to the point. The distance
 from a point ξ of the pupil to points x = c + u of a window about c is
@@ -6,8 +6,8 @@ from a point ξ of the pupil to points x = c + u of a window about c is
     |x - ξ| = √(D² - 2 u·(ξ - c) + u²) = D - u·s + (u² - (u·s)²)/2D + ...,   s = (ξ - c)/D,   D = |(ξ - c, z)|.
 
 With s as the variable, the term that is linear in u is exactly the Fourier kernel, however wide the aperture is. The
-remaining terms decrease with the distance. Over the pupil, these terms vary by about u²NA²/2λD cycles, because the rays
-are oblique.
+terms of higher order in u become smaller as D grows. Over the pupil, these terms vary by about u²NA²/2λD cycles,
+because the rays are oblique.
 """
 
 from __future__ import annotations
@@ -48,8 +48,9 @@ class SineSamples:
     centre: centre (x, y) [m] of the window.
     distance: distance [m] to the window's plane.
     steepest: |s| of the outermost sample with light.
-    elsewhere: a fixed value of a component of s - s₀. `axis_kernel.AxisFactor` evaluates the diffraction kernel along
-        one axis of the window, x or y, for points of the pupil whose s - s₀ has this value along the other axis.
+    elsewhere: value of one component of s - s₀ that some points of the pupil have in common. `axis_kernel.AxisFactor`
+        evaluates the diffraction kernel along one axis of the window, x or y, for points with this component along the
+        other axis.
     """
 
     edge: PupilEdge
@@ -63,7 +64,8 @@ class SineSamples:
     def at(self) -> np.ndarray:
         """Sines of the samples along either axis, each minus the sine of the pupil's centre along this axis.
 
-        Sines are the x and y components of the unit vector from the window's centre to a point.
+        The sines of a sample are the x and y components of the unit vector from the centre of the image window to the
+        sample.
         """
         return self.grid.x
 
@@ -97,7 +99,10 @@ class SineSamples:
 
     @property
     def layout(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coordinates x and y [m], and areas [m²] times the transmittance of the aperture, each (row, column)."""
+        """Three arrays (row, column) with a value for each sample: x [m], y [m], and the sample's weight [m²].
+
+        The weight is the area that the sample represents in the pupil's plane, times the transmittance of the aperture.
+        """
         return _layout(self)
 
     def light(self, beam: Beam, dtype: str) -> np.ndarray:
@@ -144,10 +149,11 @@ class SineSamples:
         return dr.sqrt(1 - dr.minimum(sx * sx + sy * sy, opaque(types, self.steepest**2)))
 
     def field(self, beam: Beam, types: Precision) -> Field:
-        """Return the field behind the pupil times the areas of the samples [m²].
+        """Return the field behind the pupil times the areas [m²] that the samples represent in the pupil's plane.
 
-        The area of a sample is dξ dη = z²/cos⁴θ ds dt. Here z is the distance between pupil and window, (s, t) are the
-        sines of the sample, and θ is the angle between the axis and the line from the window's centre to the sample.
+        The samples are evenly spaced in s and t, the x and y components of the unit vector from the window's centre to
+        a sample. The area of a sample is z²/cos⁴θ ds dt. Here z is the distance between pupil and window, and θ is the
+        angle between the axis and the line from the window's centre to the sample.
         """
         import drjit as dr
 
@@ -204,7 +210,7 @@ def evenly_in_sines(problem: Problem, edge: PupilEdge, cycles: float, shift: flo
 
     The distance between two points in the pupil is at most z/cos³θ times the difference between their sines. Here z is
     the distance between pupil and window, and θ is the angle of the steepest ray. The number of cycles per unit of sine
-    is therefore `cycles` times this factor.
+    is therefore at most `cycles` times z/cos³θ.
 
     cycles: number of cycles per metre in the pupil's plane [1/m].
     shift: distance by which the grid is shifted along both axes, in units of its pitch, at most 1.

@@ -1,4 +1,4 @@
-"""Samples of several pupils at once, with evenly spaced sines (see `sine_samples`), the same number in each pupil.
+"""Equal numbers of samples of several pupils, evenly spaced in sines: components of unit vectors (see `sine_samples`).
 
 All arrays are of NumPy, and their first axis counts the pupils. If the light of several wavelengths or sources passes
 the same pupil, its samples are stored once, and the first axis has length 1.
@@ -33,15 +33,15 @@ SMOOTH_SINE = 0.4  # choice: largest sine at which paths are interpolated from a
 
 @dataclass(frozen=True, eq=False)
 class SineGeometry:
-    """Conversion between points of pupils and their sines.
+    """Conversion between the position of a point in a pupil and the direction in which it is seen from the window.
 
-    Sines are the x and y components of the unit vector from the window's centre to a point.
+    The sines of a point are the x and y components of the unit vector from the window's centre to the point.
 
     distance: distances of the window [m], (pupil,).
     centre: centre (x, y) [m] of the window.
     steepest: sines of the angle between the axis and the line to the outermost sample with light, (pupil,).
-    elsewhere: a fixed sine for each pupil, minus the sine of the pupil's centre, (pupil,). `axis_kernel.AxisFactor`
-        evaluates the kernel along x for points with this sine along y, and along y for points with this sine along x.
+    elsewhere: common sine of some points along one axis, x or y, minus that of the pupil's centre, (pupil,).
+        `axis_kernel.AxisFactor` evaluates the kernel along the other axis for these points.
     """
 
     distance: np.ndarray
@@ -56,10 +56,9 @@ class SineGeometry:
         return _sines(none, none, self.centre, self.distance)
 
     def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sines of points (x, y) [m] of the pupils, minus the sines of the pupils' centres.
+        """Return components along x and y of unit vectors from the window's centre to points (x, y) [m] of the pupils.
 
-        Sines are the x and y components of the unit vector from the window's centre to a point. Both arrays have the
-        shape (pupil, ...).
+        The components of the unit vector to the pupil's centre are subtracted. Both arrays have the shape (pupil, ...).
         """
         sx, sy = _sines(x, y, self.centre, _aligned(self.distance, x))
         return sx - _aligned(self._middle[0], sx), sy - _aligned(self._middle[1], sy)
@@ -80,11 +79,12 @@ class SineGeometry:
 class SineStack(SineGeometry):
     """Soft apertures, sampled on grids of sines. `SineGeometry` defines sines.
 
-    at: sines along either axis minus those of the pupil's centre, (pupil, sample), evenly spaced.
+    at: evenly spaced sines along either axis, each minus the sine of the pupil's centre, (pupil, sample).
     edges: soft apertures, (pupil,).
     radius: radii [m], (pupil,).
-    curvature: local frequency c [cycles per radius] at the rim of a curved wave e^{iπcr²}, (pupil,). The hard aperture
-        is multiplied by this wave before the edge is softened, see `curved_ring`. 0 if there is no such wave.
+    curvature: c [cycles per radius], (pupil,), the local frequency of a curved wave e^{iπcr²} at the pupil's rim. The
+        hard aperture is multiplied by this wave before the edge is softened, see `curved_ring`. 0 if there is no such
+        wave.
     """
 
     at: np.ndarray
@@ -93,7 +93,7 @@ class SineStack(SineGeometry):
     curvature: np.ndarray
 
     def smooth(self, reach: float) -> bool:
-        """Return whether paths to points up to `reach` [m] from the axis vary smoothly over all samples."""
+        """Return whether paths from samples to points up to `reach` [m] from the axis vary smoothly over the pupils."""
         return bool(max(self.steepest.max(), reach / self.distance.min()) <= SMOOTH_SINE)
 
     @property
@@ -109,12 +109,12 @@ class SineStack(SineGeometry):
         return found
 
     def _sine2(self, dtype: str = "float64") -> np.ndarray:
-        """Return the squared sines of the angles between rays and axis, (pupil, y, x)."""
+        """Return the squared sines of the angles between the optical axis and the samples' rays, (pupil, y, x)."""
         across, down = (np.square(self.at + part[:, None]).astype(dtype) for part in self._middle)
         return np.asarray(across[:, None, :] + down[:, :, None])
 
     def _cosine2(self, dtype: str = "float64") -> np.ndarray:
-        """Return the squared cosines of the angles between rays and axis, (pupil, y, x)."""
+        """Return the squared cosines of the angles between the optical axis and the samples' rays, (pupil, y, x)."""
         found: np.ndarray = 1 - self._sine2(dtype)
         least = 1 - np.maximum(np.square(self.steepest), MOST_SQUARE)
         if (found[:, [0, 0, -1, -1], [0, -1, 0, -1]].min(axis=1) < least).any():
@@ -156,7 +156,7 @@ class SineStack(SineGeometry):
         return KeptValues(KEPT)
 
     def _sizes(self, dtype: str) -> np.ndarray:
-        """Return the areas of the samples times the transmittance of the apertures and z/D² [m], (pupil, y, x).
+        """Return products [m] of a sample's area, the transmittance of the aperture there, and z/D², (pupil, y, x).
 
         z is the distance of the window's plane, and D the distance of a sample from the middle of the window. If
         `curvature` is not 0, the transmittance is that of `curved_ring`, and the result is complex.
@@ -199,7 +199,7 @@ class SineStack(SineGeometry):
             return self._paths(stack, *self.points)
 
         def computed() -> tuple[np.ndarray, np.ndarray]:
-            """Return paths [waves] without relief and aberration, and polynomial terms y^i x^j, at Chebyshev points."""
+            """Return two arrays at Chebyshev points: paths [waves] without relief or aberration, and terms y^i x^j."""
             side = self.at[:, [0, -1]]
             nodes = side.mean(axis=1)[:, None] + np.diff(side) / 2 * chebyshev_points(count)
             points = self.points_at(nodes[:, None, :], nodes[:, :, None])
@@ -212,7 +212,7 @@ class SineStack(SineGeometry):
         return np.asarray(weight @ paths @ weight.T)
 
     def _paths(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return paths [waves] from the source through points (x, y) [m] to the window's middle, without a constant."""
+        """Return paths [waves] from source through (x, y) [m] to the window's middle, up to a constant per beam."""
         return np.asarray(stack.waves(x, y) + self._to_middle(stack.wavelength[:, None, None], x, y)[1])
 
     def _to_middle(self, wavelength: float | np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -220,12 +220,12 @@ class SineStack(SineGeometry):
         return diffraction_kernel(wavelength, self.distance[:, None, None], (x, y), self.centre)
 
     def to_middle(self, wavelength: float | np.ndarray, dtype: str) -> np.ndarray:
-        """Return the factor from the light at each sample to its contribution at the window's middle, (pupil, y, x).
+        """Return factors from the light at samples to the field at the window's middle, (pupil, y, x).
 
-        It is the complex `diffraction_kernel` [1/m²], up to a constant phase. The light that is multiplied by this
-        factor must already be multiplied by the areas [m²] of the samples.
+        A factor is the complex `diffraction_kernel` [1/m²], up to a constant phase. The light that is multiplied by it
+        must already be multiplied by the areas [m²] of the samples.
 
-        wavelength: wavelength [m] in the medium, a number.
+        wavelength: a single wavelength [m] in the medium.
         """
         key = "to_middle", float(wavelength), dtype
         return np.asarray(self.known.get(key, lambda: turned(*self._to_middle(wavelength, *self.points), dtype)))
@@ -234,13 +234,13 @@ class SineStack(SineGeometry):
 def rim_sines(
     outermost: np.ndarray, centre: tuple[float, float], distance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return three properties of each pupil's rim, which determine the grid of sines with which it is sampled.
+    """Return three properties of each pupil's rim. They determine the grid of sines on which the pupil is sampled.
 
     Sines are the x and y components of the unit vector from the window's centre to a point. The first result is half
     the width of the grid: the largest difference, along x or y, between the sine of a point on the rim and that of the
-    pupil's centre. The second is the largest sine of the angle between the axis and the line to a point on the rim. The
-    third is True for pupils in which samples with evenly spaced sines are fairly evenly spaced in the pupil's plane,
-    too: their spacing [m] at the rim is at most MOST_STRETCH times that at the centre. All are arrays (pupil,).
+    pupil's centre. The second is the largest sine of the angle between the axis and the line to a point on the rim.
+    Evenly spaced sines have a spacing [m] in the pupil's plane that grows toward the rim. The third is True if it is at
+    most MOST_STRETCH times as large there as at the centre. All are arrays (pupil,).
 
     outermost: radii [m] of the rims.
     """
@@ -278,7 +278,7 @@ def _transmittance(edge: SoftAperture, x: np.ndarray, y: np.ndarray) -> np.ndarr
 
 @lru_cache(maxsize=64)
 def even_weights(samples: int, count: int) -> np.ndarray:
-    """Return interpolation weights of Chebyshev points at evenly spaced samples, (sample, point)."""
+    """Return the matrix (sample, point) that interpolates from Chebyshev points to evenly spaced samples."""
     return np.ascontiguousarray(lagrange_basis(np.linspace(-1, 1, samples), chebyshev_points(count)).T)
 
 
@@ -288,9 +288,8 @@ def _profile(edge: SoftAperture, curvature: float, dtype: str) -> np.ndarray:
 
     Its values are in the middle of equal steps of r² up to the outermost radius with light, followed by a 0.
 
-    curvature: if it is not 0, and the aperture is a circle or a ring, the table contains the result of `curved_ring`,
-        complex in single precision.
-    dtype: type of the table otherwise, "float32" or "float64".
+    curvature: as in `SineStack`. If not 0, the table of a circle or ring is the complex result of `curved_ring`.
+    dtype: type of the table in all other cases, "float32" or "float64".
     """
     if curvature and isinstance(edge, SoftAnnulus):
         return np.append(curved_ring(edge.edge, edge.inner, curvature, SMOOTHED_LEVELS), 0)

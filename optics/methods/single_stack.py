@@ -1,4 +1,4 @@
-"""Samples of a single pupil as a `SineStack`, the samples of several pupils, that contains only this pupil.
+"""Conversion of the samples of a single pupil to a `SineStack`, the class for samples of several pupils.
 
 The stack is kept for further PSFs with the same samples. It keeps arrays (`SineStack.known`), whose memory grows with
 the number of samples.

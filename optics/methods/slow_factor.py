@@ -82,14 +82,16 @@ class Path:
 
 
 def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:
-    """Return the number of Chebyshev points per axis that interpolate the slow factor; None if `most` are too few.
+    """Return the number of Chebyshev points per axis with which the slow factor can be interpolated in the window.
 
-    The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. Interpolation is tested
-    along a few lines through the window, for light from points on the rim of the pupil, including its soft edge.
+    The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. The result is None if
+    more than `most` points are needed. Interpolation is tested along a few lines through the window, for
+    light from points on the outer border of the pupil's soft edge.
 
-    half: distance [m] from the window's centre within which the Chebyshev points lie.
-    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c} between points ξ of the pupil and u of the window. This
-        argument is not used if the samples of the pupil are evenly spaced in sines (`SineSamples`).
+    half: half the side [m] of the square around the window's centre in which the Chebyshev points lie.
+    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c}, where ξ is a point of the pupil and u a point of the
+        window. `scale` is not used if `pupil` is a `SineSamples`, whose Fourier kernel depends on the direction from
+        the window's centre to ξ instead of ξ/c.
     """
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim = pupil.outermost * np.cos(angle), pupil.outermost * np.sin(angle)
@@ -150,7 +152,8 @@ def slow_factor(
     of pupil and window, and k the wave number. All arrays are broadcast.
 
     pupil: points ξ (x, y) [m].
-    directions: components along x and y of s, the variable of the Fourier kernel e^{-ik s·u} for each point ξ.
+    directions: x and y components of the vector s for each point ξ. The slow factor is a correction to the Fourier
+        kernel e^{-ik s·u}.
     window: points u (x, y) [m], relative to the window's centre.
     dtype: type to which the phase is rounded after whole waves are subtracted, "float32" or "float64".
     """
@@ -163,7 +166,10 @@ def slow_parts(
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return amplitude and phase [waves] of `slow_factor`."""
+    """Return amplitude and phase [waves] of the slow factor, the ratio of the diffraction kernel to a Fourier kernel.
+
+    The function `slow_factor` explains the arguments and gives the formula.
+    """
     (xi, eta), (u, v), (s, t) = pupil, window, directions
     x, y = u + path.window.centre[0], v + path.window.centre[1]
     wavelength, z = path.numbers(max(part.ndim for part in (xi, eta, x, y)))
@@ -191,7 +197,7 @@ def cross_term(
     factor divided by its value at the middle of the window. The quotient F(u, v) / (F(u, 0) F(0, v)) would be 1 if F
     were a function of x times a function of y. It is about 1 + a b. The product a b is the term -ik (u s) (v t)/D in
     the exponent of F, where k = 2π/λ, and 1/D is the mean inverse distance over the pupil. Because a depends on u and
-    s, and b on v and t, the term costs as much as a second Fourier kernel along each axis.
+    s, and b on v and t, the term needs only one further matrix along each axis, as large as the Fourier kernel there.
 
     directions: s and t, the x and y components of the unit vectors from the window's centre to samples of the pupil,
         minus those of the unit vector to the pupil's centre. Their last two axes broadcast with those of `window`.

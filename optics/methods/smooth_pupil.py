@@ -1,8 +1,8 @@
 """The light behind a steep relief or wavefront, convolved with a Gaussian, so that few samples represent it.
 
 The convolution multiplies light of the spatial frequency ν by e^{-2π²δ²ν²}, where δ is the standard deviation of the
-Gaussian. It nearly removes light that is too steep to arrive in the window in which the image is computed. When the
-spectrum of the samples is divided by e^{-2π²δ²ν²}, the light that arrives in the window is restored exactly.
+Gaussian. It nearly removes light that is too steep to arrive in the window in which the image is computed. Light that
+arrives in the window is only attenuated. Division of the spectrum of the samples by e^{-2π²δ²ν²} restores this light.
 
 Within the width of the Gaussian, the phase is approximated by a quadratic function, with the slope and the curvature of
 the wavefront. The convolution then has a closed form. Near the edge of the aperture, the edge is approximated by a
@@ -91,12 +91,13 @@ def sides_of(aperture: Aperture) -> tuple[Side, ...] | None:
 
 
 class _Gaussian(NamedTuple):
-    """A complex Gaussian around each sample: the light there, times the real Gaussian of the convolution.
+    """A complex Gaussian around each sample: the light near the sample, times the real Gaussian of a convolution.
 
-    The variable of both factors is the displacement (x, y) from the sample. The phase of the light is approximated by a
-    quadratic function of the displacement, so the product is a Gaussian with complex parameters.
+    The light is convolved with this real Gaussian to smooth it. The variable of both factors is the displacement (x, y)
+    from the sample. The phase of the light is approximated by a quadratic function of the displacement, so the product
+    is a Gaussian with complex parameters.
 
-    log: logarithm of its integral.
+    log: logarithm of the integral of the complex Gaussian.
     mean: mean displacement (x, y) [m].
     covariance: covariances xx, xy and yy of the displacement [m²].
     """
@@ -106,13 +107,16 @@ class _Gaussian(NamedTuple):
     covariance: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     def along(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the mean [m] and the variance [m²] of the displacement from each sample along unit vectors (x, y)."""
+        """Return the mean [m] and the variance [m²] of one component of the displacement from each sample.
+
+        x, y: components of the unit vectors along which the component of the displacement is taken.
+        """
         return x * self.mean[0] + y * self.mean[1], self.between((x, y), (x, y))
 
     def between(self, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         """Return the covariance [m²] between two components of the displacement from each sample.
 
-        one, other: unit vectors (x, y) along which the two components are taken.
+        one, other: unit vectors (x, y) along which the two components of the displacement are taken.
         """
         xx, xy, yy = self.covariance
         return one[0] * other[0] * xx + (one[0] * other[1] + one[1] * other[0]) * xy + one[1] * other[1] * yy
@@ -152,7 +156,7 @@ class SmoothPupil:
         return 2 * (math.pi * self.width) ** 2
 
     def light(self, beam: Beam, x: np.ndarray, y: np.ndarray, dtype: Any) -> np.ndarray:
-        """Return the light behind the pupil, convolved with the Gaussian of this `width`, complex (y, x).
+        """Return the light behind the pupil, convolved with a Gaussian of the width `width`, complex (y, x).
 
         x, y: evenly spaced positions [m] along each axis.
         dtype: type of the real and imaginary parts.
@@ -183,7 +187,7 @@ class SmoothPupil:
     ) -> _Gaussian:
         """Return the Gaussian e^{-u²/2δ²} e^{2πi (W + ∇W·u + uᵀHu/2)} / 2πδ² of the displacement u.
 
-        waves: W, the phase behind the pupil [waves], without whole waves.
+        waves: W, the phase behind the pupil [waves]. Whole waves may be subtracted, as they do not change the result.
         slope: gradient of W [1/m].
         bends: H, the second derivatives of W along xx, xy and yy [1/m²].
         """
@@ -204,9 +208,10 @@ class SmoothPupil:
         integral over the whole plane is multiplied by a factor for each side near the centre of the Gaussian: the
         fraction of the Gaussian that lies in the open region of this side.
 
-        Where the relief is steep, the convolution with the Gaussian removes nearly all light. Only light that is
-        diffracted at one of the sides remains, and it comes from points on this side. The factors of the other sides
-        are therefore computed from the Gaussian as it is along this side.
+        The integral is the light of the pupil, smoothed by a convolution. Where the relief is steep, the convolution
+        removes nearly all light. Only light that is diffracted at one of the sides remains, and it comes from points on
+        this side. The factors of the other sides are therefore computed from the values of the Gaussian on the line
+        along this side.
 
         inner: Gaussians around the points.
         x, y: positions of the points, the centres of the Gaussians, in radii of the pupil.
@@ -237,7 +242,7 @@ def _behind(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return (a, b) with e^a b = erfc(-u)/2. Neither number overflows.
 
     The product is the fraction of a Gaussian that lies on one side of a line. u is the distance of the line from the
-    mean, divided by √2 times the standard deviation. It may be complex.
+    mean, divided by √2 times the standard deviation. u may be complex.
 
     The scaled function w(z) = e^{-z²} erfc(-iz) is bounded in the upper half plane (Abramowitz & Stegun, 7.1.3).
     """

@@ -3,8 +3,8 @@
 To sample all light behind a rough relief, samples would have to resolve the steepest slopes of the relief, even if
 nearly all of this light misses the window or is evanescent. Samples of the convolved light only have to resolve the
 light that arrives in the window. The spectrum of the convolved light is divided by that of the Gaussian, and propagated
-as in `angular_spectrum`. In the window, the image is set to 0 beyond `Problem.reach`, the distance from the axis within
-which all light lies, except for a fraction of the tolerance.
+as in `angular_spectrum`. In the window, the image is set to 0 beyond the distance `Problem.reach` from the axis. The
+light beyond this distance is small compared with the tolerance.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ SAMPLE_BYTES = 250.0  # arrays of float64 and complex128 per sample of the pupil
 
 @dataclass(frozen=True)
 class SmoothSpectrum(SpectrumSampling):
-    """Spectrum of a pupil whose light is convolved with a Gaussian.
+    """Samples and spectrum of the light behind a pupil, after a convolution of the light with a Gaussian.
 
     smooth: pupil whose light is convolved with a Gaussian in closed form.
-    blur: width [m] of a second Gaussian, with which the light is convolved numerically. It allows a longer pitch if the
-        Gaussian of `smooth` is narrow. 0: none.
+    blur: width [m] of a second Gaussian, with which the light is convolved numerically. If the first Gaussian is
+        narrow, the second one allows samples that are further apart. 0: no second Gaussian.
     pupil_period: number of the pupil's samples per period.
     """
 
@@ -72,7 +72,7 @@ class SmoothSpectrum(SpectrumSampling):
 
     @cached_property
     def closed_form(self) -> Grid:
-        """Grid on which the light behind the pupil is computed in closed form, convolved with a first Gaussian.
+        """Grid on which the convolution of the pupil's light with a first Gaussian is computed in closed form.
 
         The width of the first Gaussian is `smooth.width`. If `blur` is not 0, the light on this grid is then convolved
         numerically with a second Gaussian of the width `blur`. This yields the light on another grid, `pupil`.
@@ -127,9 +127,10 @@ class SmoothSpectrum(SpectrumSampling):
     def _propagated(self, light: np.ndarray, transfer: np.ndarray, window: Grid) -> np.ndarray:
         """Return the field over the window (y, x), times the squared number of samples per period.
 
-        The transforms along y, from light to spectrum and back, are computed for a few columns at a time, which fit
-        into the cache. All transforms have the first sample as their origin. Phases that are linear in the frequency
-        correct this.
+        The light is transformed to its spectrum, and the spectrum to the field in the window. Along y, both transforms
+        are computed for a few columns at a time, so that these columns fit into the cache. The FFT assumes that the
+        first sample lies at 0. Factors with phases that are linear in the frequency account for the true positions of
+        the first samples.
         """
         from scipy import fft
 
@@ -174,7 +175,8 @@ def _back(spectrum: np.ndarray, top: int, period: int) -> np.ndarray:
 def may_be_steep(beam: Beam) -> bool:
     """Return whether `smooth_spectrum` applies to the pupil: it has a smooth relief or wavefront, and no mask.
 
-    The aperture must be a circle, a ring, a slit or a convex polygon, and no number may carry a derivative.
+    The aperture must be a circle, a ring, a slit or a convex polygon, and no parameter of the light and the pupil may
+    carry a derivative.
     """
     pupil = beam.pupil
     bends = pupil.bends(beam.wavelength) or pupil.wavefront is not None
@@ -208,8 +210,11 @@ def _sampling(problem: Problem, taper: Taper, third: float) -> SmoothSpectrum:
 def _pitch(band: float, width: float, tolerance: float) -> float:
     """Return the sampling pitch [m] for light that is convolved with a Gaussian of this width [m].
 
-    Sampling aliases the frequency 1/pitch - band onto the edge of the band [1/m]. The pitch is the one for which the
-    Gaussian attenuates the aliased light by the factor ALIASED * tolerance relative to the light at the edge.
+    Sampling aliases the frequency 1/pitch - band onto the edge of the band [1/m]. The Gaussian attenuates this light
+    more than light at the edge of the band. The pitch is chosen so that the ratio of both attenuation factors is
+    ALIASED * tolerance, the largest allowed amplitude of aliased light.
+
+    band: highest frequency that is needed [1/m].
     """
     exponent = math.log(1 / (ALIASED * tolerance))
     return 1 / (band + math.sqrt(band**2 + exponent / (2 * (math.pi * width) ** 2)))

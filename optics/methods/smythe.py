@@ -1,12 +1,14 @@
 """The exact vector field behind a plane pupil: Smythe's integral, computed with scalar methods.
 
-W. R. Smythe, Phys. Rev. 72, 1066 (1947), derived the field behind the pupil from the field E in its plane:
+W. R. Smythe, Phys. Rev. 72, 1066 (1947), derived the field at the point r behind the pupil from the field E in its
+plane:
 
     E(r) = 1/2π ∇ × ∫ (ẑ × E) e^{ikR}/R dξ.
 
-The x and y components are the first Rayleigh-Sommerfeld integrals of Ex and Ey. The z component is the same integral of
--(E·(r - ξ))/z, in which terms with r and with ξ can be separated. For each of the two planes of polarisation, scalar
-methods therefore propagate three fields, each of them behind a mask.
+ξ is a point of the pupil, and R the distance from ξ to r. The x and y components are the first Rayleigh-Sommerfeld
+integrals of Ex and Ey. The z component is the same integral of -E·(r - ξ)/z. Since r is constant in the integral, only
+the integrals of Ex, Ey and E·ξ are needed. Scalar methods compute each of them as the field behind a mask with this
+amplitude, for both planes of polarisation of the light in front of the pupil.
 """
 
 from __future__ import annotations

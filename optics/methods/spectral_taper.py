@@ -23,9 +23,9 @@ class Taper:
 
     It blurs the field by `blur` [m].
 
-    The taper is an error function of the frequency. Within the distance `blur`, the Fourier transform of its derivative
-    falls to the ripple, which is the allowed error of the amplitude. Light that the taper removes must therefore land
-    at least this far outside the window.
+    The taper is an error function of the frequency. Its derivative with respect to the frequency is a Gaussian, and the
+    Fourier transform of this Gaussian falls to the allowed error of the amplitude at the distance `blur`. Light that
+    the taper removes must therefore land at least this far outside the window.
 
     sine, tangent: sine and tangent of the angle at which the taper ends.
     """
@@ -49,8 +49,8 @@ class Taper:
     def fade(self, f2: Array, types: Precision) -> Array:
         """Return the taper: 1 up to the frequency `band` and 0 beyond `end`, to within the ripple.
 
-        The ripple is the allowed error of the amplitude. At the argument √ln(1/ripple), the error function differs from
-        its limit by at most the ripple.
+        The ripple is the allowed error of the amplitude. The taper is (1 - erf(u))/2, where u is -√ln(1/ripple) at
+        `band` and √ln(1/ripple) at `end`. At these values, erf(u) differs from -1 and 1 by at most the ripple.
 
         f2: squared frequencies f², float64.
         """
@@ -64,7 +64,10 @@ class Taper:
 
 
 def tapers(problem: Problem) -> list[Taper]:
-    """Return tapers that fade the angular spectrum out before grazing incidence, in the order of increasing blur."""
+    """Return tapers to choose from, each of which fades the angular spectrum out before grazing incidence.
+
+    They are in the order of increasing `Taper.blur`, the distance [m] by which a taper blurs the field.
+    """
     size = problem.radius + problem.outermost
     found = [Taper.for_problem(problem, blur * size) for blur in FADES]
     return [taper for taper in found if taper.sine < TAPER_END_SINE]

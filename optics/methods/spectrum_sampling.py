@@ -26,13 +26,13 @@ __all__ = ["SpectrumSampling"]
 
 
 class SpectrumSampling:
-    """Grid of the spectrum of the light behind a pupil, and grids in the planes where the field is computed from it.
+    """Grid of the spectrum of the light behind a pupil, and grids of the fields that are computed from the spectrum.
 
     method: "angular_spectrum" or "split_angular_spectrum".
     taper: taper that fades the spectrum out.
     period: width [m] after which the field in the pupil's plane repeats. The spectrum's samples are 1/period apart.
-    output_period: number of samples after which the field in the window's plane repeats. With the split method, it is
-        this number in the `relay` plane.
+    output_period: number of samples after which the field in the window's plane repeats. With the split method, number
+        of samples after which the field in the `relay` plane repeats.
     even: True if the field is even in x and y. A quarter of the samples of each plane is then sufficient.
     """
 
@@ -46,7 +46,8 @@ class SpectrumSampling:
     def is_whole(self) -> bool:
         """True if the spectrum is propagated to the window in one step.
 
-        False for the split method, which leaves the paraxial part of the propagation to Fresnel's integral.
+        False for the split method, which propagates the spectrum to an intermediate plane first, without the paraxial
+        part of the phase. Fresnel's integral from there to the window adds this part.
         """
         return self.method == "angular_spectrum"
 
@@ -65,7 +66,7 @@ class SpectrumSampling:
         return Grid.square(self.output_period, self.period / self.output_period)
 
     def part(self, grid: Grid) -> Grid:
-        """Return the part of a grid on which a field is stored: a quarter if the field is even in x and y, else all."""
+        """Return the part of a grid that is stored: a quarter if the field is even in x and y, else the whole grid."""
         return quarter(grid) if self.even else grid
 
     def sum(self, field: Field, start: Grid, period: Scalar, end: Grid, sign: int, first: int = 0) -> Field:

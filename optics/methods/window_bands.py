@@ -1,4 +1,4 @@
-"""Bands of spatial frequencies of the light in pupils, by which edges are softened and samples are counted.
+"""Bands of spatial frequencies of the light in pupils, which determine soft edges and numbers of samples.
 
 The light of a ray has a frequency in the pupil's plane: the number of cycles of its phase per radius of the pupil. The
 edge of the pupil diffracts the light of a ray to a band of frequencies around the frequency of the ray. From these
@@ -22,11 +22,11 @@ class Bands:
 
     The shape of all arrays is (beam,).
 
-    density: numbers of samples per radius of the pupil. The light that is computed from the samples repeats after
-        this number of cycles per radius.
-    passband: frequencies up to which softening the edge does not change the spectrum of the aperture.
+    density: numbers of samples per radius of the pupil. The sampled light has a periodic spectrum, whose period is this
+        number of cycles per radius.
+    passband: highest frequency at which the spectrum of the aperture is the same with a soft edge as with a sharp edge.
     around: largest changes of frequency by diffraction at the edge. The edge diffracts a ray of one frequency to a band
-        of frequencies around it. Changes to frequencies of light that misses the window do not matter.
+        of frequencies around it. Only diffracted light that arrives in the window counts.
     """
 
     density: np.ndarray
@@ -39,10 +39,10 @@ class Bands:
         return Bands(*(np.where(chosen, own, their) for own, their in pairs))
 
     def stepped(self, chosen: np.ndarray) -> Bands:
-        """Return these bands, with the attribute `density` of the chosen beams rounded up to the steps of `in_steps`.
+        """Return these bands, with the attribute `density` of the chosen beams rounded up to a number 2^(k/EDGES).
 
-        There are only a few steps, so pupils with similar light get equal numbers of samples per radius, and can share
-        the arrays for their samples. The passband grows by the same factor as the density.
+        k is an integer. There are only a few such numbers, so pupils with similar light get equal numbers of samples
+        per radius, and can share the arrays for their samples. The passband grows by the same factor as the density.
         """
         density = in_steps(self.density)
         return Bands(density, self.passband * (density / self.density), self.around).where(chosen, self)
@@ -51,7 +51,7 @@ class Bands:
 def in_steps(values: np.ndarray, count: int = EDGES) -> np.ndarray:
     """Return values rounded up to the next of the numbers 2^(k/count), where k is an integer.
 
-    count: number of these values per octave, that is, from a number to its double.
+    count: number of steps k per octave, that is, from a number to its double.
     """
     return np.asarray(2.0 ** (np.ceil(count * np.log2(values) - 1e-9) / count))
 

@@ -1,15 +1,16 @@
 """The error of a PSF that was computed from few samples of the pupil.
 
-The check compares the PSF with a sum over other samples, in a few rows and columns of the window. The other samples are
-finer, and the soft edge of their aperture is sharper. Their grid is shifted by a fraction of the pitch that is not a
-simple ratio. The comparison therefore shows the errors due to aliased light, to detail between the samples, and to the
-soft edge.
+The PSF is a sum over these samples. The check compares it with a sum over other samples, in a few rows and columns of
+the window. The other samples are finer, and the soft edge of their aperture is sharper. Their grid is shifted by a
+fraction of the pitch that is not a simple ratio. The comparison therefore shows the errors due to aliased light, to
+detail between the samples, and to the soft edge.
 
 The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. The PSF is computed by
 interpolation of this factor over the window, and the check interpolates the factor over the pupil instead. The
-comparison therefore also shows the error of the interpolation over the window. Both sums use the slow factor, so the
-check also compares this factor with the diffraction kernel itself. The interpolation over the pupil has an error, too.
-Its number of points is chosen for an error below half the tolerance, and a larger error is added to the estimate.
+comparison therefore also shows the error of the interpolation over the window. An error that both sums share does not
+appear in the comparison. Both use the slow factor, so the check also compares this factor with the diffraction kernel
+itself, for a few rays. The interpolation over the pupil has an error, too. The number of interpolation points is chosen
+so that this error is below half the tolerance. If it is larger, it is added to the estimated error of the PSF.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def window_errors(samples: SineStack, path: Path, field: Array, crossings: Windo
 
 @dataclass(frozen=True, eq=False)
 class _CheckSums:
-    """Sums over samples of pupils that yield the field U at points of a window, the crossings of some rows and columns.
+    """Sums over samples of pupils. The sums yield the field U where some rows and columns of a window cross.
 
     Parts that do not depend on the light are cached. The slow factor is the factor by which the diffraction kernel
     differs from a Fourier kernel, divided by its value at the middle of the window. A_u and A_v are the values of the
@@ -126,10 +127,11 @@ class _CheckSums:
     def _interpolation(self) -> tuple[np.ndarray, np.ndarray, RemainingFactor]:
         """Interpolation points in the pupil, errors of the interpolation, and values of the interpolated factor G.
 
-        G is a slowly varying factor of the diffraction kernel (see `_CheckSums`). The first result contains the
-        sines of the interpolation points along an axis, (pupil, point). A sine is a component of the unit vector from
-        the window's centre to a point, minus that for the pupil's centre. The second result contains the errors of the
-        interpolation, see `apart`. The third is G for all pairs of these sines, as a `RemainingFactor`.
+        G is a slowly varying factor of the diffraction kernel (see `_CheckSums`). The first result contains the sines
+        of the interpolation points along an axis, (pupil, point). A sine is a component of the unit vector from the
+        window's centre to a point, minus the same component of the unit vector to the pupil's centre. The second result
+        contains the errors of the interpolation, see `apart`. The third is G for all pairs of these sines, as a
+        `RemainingFactor`.
 
         Increasing numbers of points are tried. For each, the interpolated G is compared with the value that follows
         from the diffraction kernel itself, for rays from the middle and from the rim of the pupil to the corners of the
@@ -168,15 +170,16 @@ class _CheckSums:
         """Weights that interpolate a function along an axis of the pupil, (interpolation point, sample).
 
         The value at a sample is the sum over the interpolation points of weight times value. The weights are the same
-        for all pupils, because their interpolation points and samples differ only in scale.
+        for all pupils, because interpolation points and samples differ only in scale from pupil to pupil.
         """
         return lagrange_basis(self.samples.at[0], self._interpolation[0][0]).astype(self.dtype)
 
     def _rows(self, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the diffraction kernels along x, for columns of the window, and along y, for rows.
 
-        They are the kernels A_u e^{-ik u s} and A_v e^{-ik v t} of `_CheckSums`. The shape of each is
-        (stack, column or row, sample).
+        They are A_u e^{-ik u s} and A_v e^{-ik v t}. The exponentials are Fourier kernels for the position (u, v) in
+        the window and the sines (s, t) of a sample, and A_u and A_v are slowly varying factors (see `_CheckSums`). The
+        shape of each is (stack, column or row, sample).
 
         columns, rows: indices, (stack, column) and (stack, row).
         """
@@ -199,12 +202,12 @@ class _CheckSums:
 
     @cached_property
     def _along(self) -> tuple[np.ndarray, np.ndarray]:
-        """Values of the slow factor along the axes of the window: A_u in all columns and A_v in all rows.
+        """Slow factor on the x axis of the window, at all columns, and on the y axis, at all rows.
 
-        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel (see `_CheckSums`).
-        The values are for the interpolation points of a single pupil. The first axis of both arrays distinguishes the
-        amplitude (0) and the phase [waves] (1). The shapes are (part, 1, interpolation point along x, 1, column) and
-        (part, interpolation point along y, 1, 1, row).
+        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel (A_u and A_v in
+        `_CheckSums`). The values are for the interpolation points of a single pupil. The first axis of both arrays
+        distinguishes the amplitude (0) and the phase [waves] (1). The shapes are (part, 1, interpolation point along x,
+        1, column) and (part, interpolation point along y, 1, 1, row).
         """
         factor, (u, v) = self._interpolation[2], self._places
         across = factor.along[0].at(factor.rounded(u[None, None, None, None, :]))
@@ -237,8 +240,9 @@ def _remaining(
     """Return the quotient of the diffraction kernel and factors that are computed elsewhere, as a complex array.
 
     The factors are the kernel's value at the middle of the window, the Fourier kernel, and two axis factors. The slow
-    factor is the factor by which the kernel differs from a Fourier kernel. The axis factors are its values on the x and
-    y axes of the window. `RemainingFactor` computes the same quotient from a formula for the slow factor.
+    factor is the factor by which the kernel differs from a Fourier kernel. The axis factors are the values of the slow
+    factor on the x and y axes of the window. `RemainingFactor` computes the same quotient from a formula for the slow
+    factor.
 
     directions: x and y components (s, t) of the difference of two unit vectors, which point from the window's centre to
         a point of a pupil and to the pupil's centre.

@@ -1,10 +1,11 @@
-"""Crossings of a few rows and columns, where `window_check` computes a PSF once more.
+"""Choice of a few rows and columns of a PSF. Where they cross, `window_check` computes the PSF in a second way.
 
-Each row has a probability. It is added up from row to row, and a row is chosen wherever the sum reaches the next of
-evenly spaced levels. Columns are chosen in the same way. The probability is a mixture of four distributions. The first
-is uniform. The second is proportional to the square root of the intensity. The error of the intensity is proportional
-to this root, too, if the error of the amplitude is the same everywhere. The third favours the brightest samples and
-their neighbours. The last favours the sides of the window, where phases change fastest.
+Each row has a probability of being chosen. The probabilities are added up from row to row. Whenever the sum reaches one
+of several evenly spaced levels, this row is chosen. Columns are chosen in the same way. The probability is a mixture of
+four distributions. The first is uniform. The second is proportional to the square root of the intensity. This favours
+rows with large errors: if the error of the amplitude is the same everywhere, the error of the intensity is proportional
+to this root. The third favours the brightest samples and their neighbours. The last favours the sides of the window,
+where phases change fastest.
 """
 
 from __future__ import annotations
@@ -24,13 +25,15 @@ SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities of rows a
 
 @dataclass(frozen=True, eq=False)
 class WindowCrossings:
-    """Samples of PSFs that are checked: the crossings of a few rows and columns of each PSF.
+    """Samples at which PSFs are checked: the crossings of a few rows and columns of each PSF.
 
     The first axis of all arrays, `stack`, counts the PSFs.
 
     rows, columns: indices, (stack, row) and (stack, column).
-    images: |U|² at the crossings, (stack, row, column), an array of NumPy or PyTorch like the PSFs, on the same device.
-    chance: probability of each crossing, the product of those of its row and column, (stack, row, column).
+    images: |U|² at the crossings, (stack, row, column), an array of the same library (NumPy or PyTorch) and on the same
+        device as the PSFs.
+    chance: probability of each crossing, which is the probability of its row times that of its column, (stack, row,
+        column).
     total: sum of |U|⁴ over the window, (stack,).
     """
 
@@ -42,9 +45,11 @@ class WindowCrossings:
 
     @classmethod
     def from_images(cls, images: Array) -> WindowCrossings:
-        """Return a few rows and columns of PSFs, chosen by their intensities, with the intensities at the crossings.
+        """Return a few rows and columns of each PSF, and the intensities where they cross.
 
-        If the PSFs are on another device, only the indices of rows and columns are copied to the processor.
+        Rows and columns are chosen with probabilities that depend on the intensities in them.
+
+        If the PSFs are on a GPU, only the indices of rows and columns are copied to the CPU.
 
         images: PSFs |U|², (stack, y, x), an array of NumPy or PyTorch.
         """
@@ -76,9 +81,9 @@ class WindowCrossings:
 
 
 def _along_axis(root: Array, bright: Array) -> tuple[Array, Array]:
-    """Return the indices of a few rows of each PSF, chosen by probability, and their probabilities, (stack, row) each.
+    """Return the indices of a few rows of each PSF, and the probabilities of choosing these rows, (stack, row) each.
 
-    Columns are chosen in the same way, from their sums instead of those of rows.
+    The probabilities depend on sums over each row. With sums over each column instead, the function chooses columns.
 
     root: sum of the square root of the intensity over each row, (stack, row).
     bright: sum of the squared intensity over each row, (stack, row).
@@ -102,5 +107,5 @@ def _along_axis(root: Array, bright: Array) -> tuple[Array, Array]:
 
 
 def _beams(places: Array) -> Array:
-    """Return the indices 0, 1, 2, ... of the PSFs, which lie along the first axis of `places`, array (stack, 1)."""
+    """Return the index 0, 1, 2, ... of each PSF, array (stack, 1). The first axis of `places` counts the PSFs."""
     return library(places).ones_like(places[:, :1]).cumsum(0) - 1

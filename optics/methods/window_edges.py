@@ -1,14 +1,14 @@
 """Soft edges of several pupils at coarse tolerances, and the numbers of samples that pupils with these edges need.
 
-The sine of a sample is that of its direction as seen from the window. Samples are evenly spaced in their sines. If the
-spacing is Δs, the computed light repeats in the window's plane with the period λ/Δs. The period must be at least half
-the width of the window plus the radius of the circle around its middle in which nearly all light arrives. Light that
-the edge of the pupil diffracts spreads further. A soft edge keeps it out of the window. Softening changes light only
-far from the places where geometrical rays through the edge arrive. There is little light so far away.
+Samples are evenly spaced in sines, the x and y components of the unit vector from the window's centre to a sample. If
+the spacing is Δs, the computed light repeats in the window's plane with the period λ/Δs. Nearly all light arrives in a
+circle around the middle of the window. The period must be at least the radius of this circle plus half the width of the
+window. Light diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window. Softening
+changes light only far from the places where geometrical rays through the edge arrive. Little light is so far away.
 
 The edge is softened by convolution with a kernel. For a disk or a ring, a strongly curved wave can be convolved with
-this kernel, too (`curved_disk`), if most of its light misses the window. This removes light far from the window.
-The number of samples is then almost independent of the directions of the rays at the edge.
+this kernel, too (`curved_disk`), if most of its light misses the window. This removes light far from the window. The
+number of samples is then almost independent of the directions of the rays at the edge.
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ class WindowEdges:
     """Soft edges of several pupils for one window.
 
     tolerance: tolerances of the PSFs, (beam,).
-    derivatives: requested derivatives, which need narrower edges and more samples; None if none are requested.
-    smoothed: True if strongly curved waves may be convolved with the kernel of the edge; ignored with derivatives.
+    derivatives: requested derivatives, which need narrower edges and more samples, or None.
+    smoothed: True if strongly curved light may be convolved with the kernel of the edge. No effect with `derivatives`.
     """
 
     stack: LightStack
@@ -76,31 +76,31 @@ class WindowEdges:
 
     @cached_property
     def curvature(self) -> np.ndarray:
-        """Curvatures of the waves that are convolved with the kernel of the soft edge, 0 for all other waves, (beam,).
+        """Curvature of each beam whose light is convolved with the kernel of the soft edge, 0 for others, (beam,).
 
-        The curvature is the local frequency of the wave at the rim in cycles per radius.
+        The curvature is the spatial frequency of the light at the rim in cycles per radius.
         """
         return self._choice[0]
 
     @property
     def density(self) -> np.ndarray:
-        """Numbers of samples per radius. The light repeats after this number of cycles per radius, (beam,)."""
+        """Numbers of samples per radius, (beam,). They are also the period of the spectrum in cycles per radius."""
         return self._choice[1].density
 
     @property
     def stepped(self) -> np.ndarray:
-        """True for beams whose numbers of samples per radius are rounded up to the steps of `in_steps`, (beam,)."""
+        """True for beams whose numbers of samples per radius are rounded up by `in_steps` to a few values, (beam,)."""
         return self.stack.mapped | (self.stack.rim_slopes is not None)
 
     @cached_property
     def edges(self) -> list[SoftAperture]:
-        """Soft aperture of each pupil, from which its samples are computed, (beam,)."""
+        """Aperture of each pupil with a soft edge, used to compute the samples of the pupil, (beam,)."""
         wide = partial(self._wide, self._choice[1].passband, self._ripples(self.curvature)[0])
         return self._unless_mapped(wide, partial(self._narrow, self.density, CARRIED_RIPPLES[0]))
 
     @cached_property
     def finer_edges(self) -> list[SoftAperture]:
-        """Soft apertures like `edges`, but up to SHARPER times as sharp, for finer samples that check PSFs, (beam,)."""
+        """Apertures whose edges are sharper than in `edges`, for the finer samples used to check the PSFs, (beam,)."""
         return self._unless_mapped(self._finer_wide, partial(self._narrow, FINER * self.density, CARRIED_RIPPLES[1]))
 
     def _finer_wide(self) -> list[SoftAperture]:
@@ -125,7 +125,7 @@ class WindowEdges:
 
     @cached_property
     def _choice(self) -> tuple[np.ndarray, Bands]:
-        """Values of the property `curvature`, and frequency bands for the samples and the soft edges of the pupils."""
+        """Array `curvature`, and the frequency bands that determine the samples and the soft edges of the pupils."""
         none = np.zeros(len(self.tolerance))
         flat = self._bands(none)
         if not self.smoothed or self.derivatives is not None:
@@ -152,9 +152,9 @@ class WindowEdges:
         return np.asarray(np.rint(outward / CURVATURE_STEP) * CURVATURE_STEP)
 
     def _bands(self, curvature: np.ndarray) -> Bands:
-        """Return the frequency bands for the samples and the soft edge of each pupil.
+        """Return the bands of frequencies that determine, for each pupil, its number of samples and its soft edge.
 
-        curvature: frequency at the rim if the wave is convolved with the kernel of the soft edge, else 0, (beam,).
+        curvature: frequency at the rim if the light is convolved with the kernel of the soft edge, else 0, (beam,).
         """
         slopes, bend, cycles, mapped = self.stack.slopes, curvature[:, None], self.geometry.cycles, self.stack.mapped
         along, curved = self._along, bool(curvature.any())
@@ -181,7 +181,7 @@ class WindowEdges:
         return Bands(density, passband, near).stepped(self.stepped)
 
     def _carried(self, rim: np.ndarray, direct: np.ndarray) -> Bands:
-        """Return the frequency bands [cycles per radius] for PSFs with derivatives. They have sharper edges.
+        """Return the frequency bands [cycles per radius] for PSFs with derivatives, which need sharper edges.
 
         rim: median frequencies of the rays at the edge, (beam,).
         direct: numbers of samples per radius that would be enough without diffraction at the edge, (beam,).
@@ -198,7 +198,7 @@ class WindowEdges:
 
     @property
     def _widest(self) -> np.ndarray:
-        """Samples per radius below which a narrow soft edge would extend beyond EDGE_REACH, (beam,)."""
+        """Least samples per radius, (beam,). Fewer need a soft edge wider than the limit EDGE_REACH [radii]."""
         widest = _transition(CARRIED_RIPPLES[1]) / (1 - CARRIED_PASSBAND) * 2.0 ** (1 / EDGES)
         return np.asarray(widest + self.geometry.cycles / 2)
 
@@ -208,7 +208,7 @@ class WindowEdges:
         return self.stack.mask_cycles(np.minimum(self.tolerance, 0.1))
 
     def _reach(self, along: np.ndarray) -> np.ndarray:
-        """Return the frequencies [cycles per radius] that only a negligible part of all rays exceeds, (beam,).
+        """Return the frequency [cycles per radius] that only a negligible share of a beam's rays exceeds, (beam,).
 
         along: frequencies of the rays [cycles per radius], (beam, ray).
         """
@@ -219,14 +219,14 @@ class WindowEdges:
 
     @cached_property
     def _along(self) -> np.ndarray:
-        """Maximum of the absolute frequencies of each ray along x and y [cycles/radius], see `_paths`, (beam, ray)."""
+        """Larger of the absolute frequencies along x and y at each ray [cycles/radius], see `_paths`, (beam, ray)."""
         return np.asarray(np.maximum(*map(np.abs, self._to_middle)))
 
     def _steepest(self, curvature: np.ndarray) -> np.ndarray | float:
-        """Return upper bounds [cycles per radius] of the light's frequency at nearly all points of the rim, (beam,).
+        """Return a bound for the frequency of the light at the rim [cycles/radius], which few points exceed, (beam,).
 
-        They are 0 for maps, and if no relief or wavefront is a polynomial of high order, as these are steepest there.
-        The frequency of a curved wave, `curvature` at the rim, is subtracted before (see `_unbent`).
+        Polynomials of high order are steepest at the rim. The bound is 0 if no relief or wavefront is one, and for
+        maps. The frequency of a curved wave, which is `curvature` at the rim, is first subtracted (see `_unbent`).
         """
         slopes = self.stack.rim_slopes
         if slopes is None:
@@ -241,12 +241,12 @@ class WindowEdges:
         return self._paths(self.stack.slopes)
 
     def _paths(self, slopes: StackSlopes) -> tuple[np.ndarray, np.ndarray]:
-        """Return frequencies of rays along x and y [cycles/radius], 0 for rays to the window's middle, (beam, ray)."""
+        """Return frequencies at rays along x and y [cycles/radius], 0 for light to the window's middle, (beam, ray)."""
         path = self.geometry.to_middle(slopes.across)
         return (slopes.along_x + path.along_x) * path.cycles, (slopes.along_y + path.along_y) * path.cycles
 
     def _ripples(self, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return errors allowed in spectra of soft apertures, of `edges` and of `finer_edges`, (beam,) each."""
+        """Return the allowed error of the apertures' spectra, for `edges` and for `finer_edges`, (beam,) each."""
         share = self._ripple_share
         if curvature.any():
             share = np.where(curvature != 0, SMOOTHED_RIPPLE, 1.0) * share
@@ -254,12 +254,12 @@ class WindowEdges:
 
     @cached_property
     def _ripple_share(self) -> np.ndarray:
-        """Ratios of the errors in `_ripples` to those that are allowed at a PSF tolerance of 0.01, (beam,)."""
+        """Allowed errors of the apertures' spectra, relative to those at a PSF tolerance of 0.01, (beam,)."""
         share = np.minimum(2.0 ** np.floor(np.log2(self.tolerance / 0.01)), 1.0)
         return np.asarray(share**RIPPLE_EXPONENT)
 
     def _wide(self, passband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
-        """Return soft apertures that leave frequencies up to `passband` unchanged, and are as wide as possible."""
+        """Return apertures with the widest soft edges that leave their spectra up to `passband` unchanged."""
         passband = in_steps(passband)
         return self._soft(passband, passband + _transitions(ripples), ripples)
 
@@ -281,7 +281,7 @@ def _unbent(paths: tuple[np.ndarray, np.ndarray], slopes: StackSlopes, curvature
     Frequencies [cycles per radius] are subtracted along x and along y, and the larger absolute value is returned.
 
     paths: frequencies of the rays along x and along y.
-    curvature: frequency of the curved wave at the rim, (beam,). It is proportional to the distance from the axis.
+    curvature: the wave's frequency at the rim, (beam,). The frequency is proportional to the distance from the axis.
     """
     parts = zip(paths, (slopes.x, slopes.y), strict=True)
     return np.asarray(np.maximum(*(np.abs(part - curvature[:, None] * at) for part, at in parts)))

@@ -32,7 +32,8 @@ class PathSlopes(NamedTuple):
     """Gradients of the optical paths from points of the pupils to the middle of a window.
 
     along_x, along_y: gradients along x and y of the pupil, (beam, point).
-    cycles: frequency of the light for a gradient of 1, in cycles of the phase per radius of the pupil, (beam, 1).
+    cycles: factor that converts a gradient to a spatial frequency of the light in the pupil. The frequency is given in
+        cycles of the phase per radius of the pupil. Array (beam, 1).
     rim: indices of the points near the rim.
     """
 
@@ -43,18 +44,19 @@ class PathSlopes(NamedTuple):
 
 
 class PlannedRays(NamedTuple):
-    """Some points of the pupils, with one ray each, from which a plan determines the rank of the slow factor.
+    """Rays from some points of each pupil. A plan uses the rays to determine the rank of the slow factor.
 
     The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. Its rank is the number
     of Chebyshev points per axis of the window that are enough to interpolate it.
 
     some: indices of the points in `disk_points`.
-    at: positions (x, y) [m] of the points relative to the middle of the window, (beam, ray).
-    scale: distance [m] in the window by which a ray moves if the slope of its optical path grows by 1, (beam, ray).
+    at: positions (x, y) [m] of the points, relative to the middle of the window, (beam, ray).
+    scale: distance [m] by which the place where a ray hits the window moves if the gradient of the optical path with
+        respect to the ray's point in the pupil grows by 1, (beam, ray).
     blur: distance [m] by which diffraction spreads the light, (beam, 1).
-    directions: sines along x and y of the lines from the middle of the window to the points, minus those of the line to
-        the pupil's centre, (beam, ray).
-    sine2: sum of the squares of these differences along x and y, (beam, ray).
+    directions: x and y components of the unit vectors from the middle of the window to the points, minus those of the
+        unit vector to the pupil's centre, (beam, ray).
+    sine2: sum of the squares of both arrays in `directions`, (beam, ray).
     """
 
     some: slice
@@ -69,7 +71,8 @@ class PlannedRays(NamedTuple):
 class WindowGeometry:
     """Geometry of several beams and of their window.
 
-    Reliefs, wavefronts and masks are not part of the geometry. Results that depend only on it are computed once.
+    Reliefs, wavefronts and masks are not part of the geometry. Results that depend only on the geometry are
+    computed once.
 
     light: radii of the pupils, distances, wavelengths, media, ideal lenses and sources.
     window: samples of the window.
@@ -80,7 +83,7 @@ class WindowGeometry:
 
     @cached_property
     def half(self) -> float:
-        """Half the width [m] of a square around the window's middle, in which all interpolation points lie."""
+        """Half the width [m] of a square around the window's middle. All interpolation points lie in this square."""
         return half_window(self.window)
 
     @cached_property
@@ -143,7 +146,10 @@ class WindowGeometry:
         return (x, y), np.sqrt(x * x + y * y + np.square(distance))
 
     def rims(self, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return three properties of the outer ends of soft edges, as seen from the window; see `rim_sines`.
+        """Return the three arrays (beam,) of `rim_sines` for circles at which the soft edges of the pupils end.
+
+        They are half the width of a pupil's grid of sines, the largest sine on the circle, and whether points with
+        evenly spaced sines are also fairly evenly spaced in the pupil.
 
         reach: distances in pupil radii by which the soft edges extend beyond the rims, (beam,).
         """
@@ -154,10 +160,10 @@ class WindowGeometry:
         return found
 
     def ray_factor(self, across: int, steepest: np.ndarray, elsewhere: np.ndarray) -> RemainingFactor:
-        """Return the slow factor divided by its values on the x axis and by those on the y axis of the window.
+        """Return F(u, v) / (F(u, 0) F(0, v)) for light from the points of the pupils that the method `rays` returns.
 
-        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. It depends on the
-        point of the pupil where light starts. The points are those that the method `rays` returns.
+        F(u, v) is the slow factor at a position (u, v) relative to the middle of the window. The slow factor is the
+        factor by which the diffraction kernel differs from a Fourier kernel.
 
         across: number of points across the pupil, see `disk_points`.
         steepest, elsewhere: see `SineGeometry`.

@@ -121,9 +121,9 @@ def _node_factors(path: Path, samples: SineStack, nodes: np.ndarray, dtype: str)
     """Return a slowly varying factor of the diffraction kernel at nodes (points) of the window.
 
     The slow factor is the quotient of the diffraction kernel and a Fourier kernel, divided by the value of this
-    quotient at the middle of the window. The result is the slow factor at a node, divided by the values of the slow
-    factor on the x axis and on the y axis of the window (see `RemainingFactor`). It differs from 1 only off these axes.
-    The shape is (pupil, node along y, node along x, row of samples, column of samples).
+    quotient at the middle of the window. If F(u, v) is the slow factor at a node (u, v), the result is the quotient
+    F(u, v) / (F(u, 0) F(0, v)) (see `RemainingFactor`). It differs from 1 only off the x and y axes of the window. The
+    shape is (pupil, node along y, node along x, row of samples, column of samples).
     """
     s, t = samples.at[:, None, None, None, :], samples.at[:, None, None, :, None]
     u, v = nodes[None, None, :, None, None], nodes[None, :, None, None, None]

@@ -1,6 +1,6 @@
-"""Choice of the samples of several pupils, for PSFs with coarse tolerances.
+"""Samples of several pupils, chosen for PSFs with coarse tolerances.
 
-There are only the samples that are necessary for the light that arrives in the window (see `window_edges`).
+A pupil has only as many samples as the light that arrives in the window requires (see `window_edges`).
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of th
 
 @dataclass(frozen=True, eq=False)
 class WindowPlan:
-    """Choice of the samples of several pupils. The PSFs over one window are computed by sums over these samples.
+    """Samples of several pupils, chosen for computing PSFs over one window by sums over these samples.
 
     stack: light of the beams, each with its pupil.
     tolerance: tolerances of the PSFs, (beam,).
-    derivatives: kinds of derivatives that are requested, which need more samples; None if none are.
-    smoothed: True if strongly curved waves may be smoothed at the edge of the pupil, which takes fewer samples. This is
-        impossible with derivatives.
+    derivatives: requested derivatives, which need more samples than the PSFs alone; None if none are requested.
+    smoothed: True if strongly curved waves may be convolved with the kernel that softens the edge of the pupil. The
+        convolution reduces the number of samples. It is not used with derivatives.
     """
 
     stack: LightStack
@@ -52,9 +52,9 @@ class WindowPlan:
 
     @cached_property
     def geometry(self) -> WindowGeometry:
-        """The window, and what determines the light apart from reliefs, wavefronts and masks.
+        """The window and all properties of the beams except reliefs, wavefronts and masks.
 
-        These are radii, distances, wavelengths, refractive indices, ideal lenses and sources.
+        The properties are radii, distances, wavelengths, refractive indices, ideal lenses and sources.
         """
         return window_geometry(self.stack, self.window)
 
@@ -65,7 +65,7 @@ class WindowPlan:
 
     @cached_property
     def counts(self) -> np.ndarray:
-        """Numbers n of samples of each pupil from its middle to its rim, along x and along y, (beam,).
+        """Number n of samples of each pupil from its middle to its rim, the same along x and along y, (beam,).
 
         A pupil has 2n + 1 samples along either axis. The number is 0 for pupils that cannot be sampled in this way,
         because rays are too oblique, or because too many samples or interpolation points would be necessary.
@@ -84,17 +84,18 @@ class WindowPlan:
 
     @staticmethod
     def finer_count(count: np.ndarray) -> np.ndarray:
-        """Return the number n of finer samples from a pupil's middle to its rim, with which `window_check` checks PSFs.
+        """Return the number n of samples from a pupil's middle to its rim in the finer grid for `window_check`.
 
-        A pupil has 2n + 1 finer samples along either axis.
+        `window_check` compares a PSF with a sum over this grid, which is finer than the grid that the PSF is computed
+        from. The finer grid has 2n + 1 samples along either axis.
 
-        count: number of the PSF's own samples from the middle to the rim, see `counts`.
+        count: number of samples from the middle to the rim in the grid of the PSF, see `counts`.
         """
         return np.ceil(FINER * count + SHIFT).astype(int)
 
     @property
     def ranks(self) -> np.ndarray:
-        """Numbers of points along an axis of the window between which the slow factor is interpolated, (beam,).
+        """Number of interpolation points of the slow factor along each axis of the window, (beam,).
 
         The slow factor is the quotient of the diffraction kernel and a Fourier kernel. The number is 0 if more than
         MOST_RANK points would be necessary.
@@ -116,11 +117,14 @@ class WindowPlan:
 
     @cached_property
     def elsewhere(self) -> np.ndarray:
-        """Typical sines of the points of the pupils as seen from the window, minus those of the centres, (beam,).
+        """A typical sine of the points of each pupil, (beam,).
 
-        The diffraction kernel along one axis is computed for points with this sine along the other axis (see
-        `SineGeometry`). The sines are values of `WindowRays.mean_sine`, rounded to multiples of a step, so that similar
-        PSFs can share arrays. The step is 1/ELSEWHERE of the largest sine at the rim.
+        The sines of a point are the x and y components of the unit vector from the middle of the window to the point,
+        minus those of the unit vector to the pupil's centre. The diffraction kernel along x is computed for points with
+        the typical sine along y, and the kernel along y for points with this sine along x (see `SineGeometry`).
+
+        The typical sine is `WindowRays.mean_sine`, rounded to a multiple of a step, so that similar PSFs can share
+        arrays. The step is 1/ELSEWHERE of the largest sine at the rim.
         """
         step = np.minimum(self._rims[1], 1.0) / ELSEWHERE
         return np.asarray(np.rint(self._rays.mean_sine / step) * step)
@@ -152,12 +156,12 @@ class WindowPlan:
 
     @cached_property
     def seconds(self) -> np.ndarray:
-        """Predicted computing times [s] of the PSFs of the beams, each computed alone, (beam,)."""
+        """Predicted time [s] for computing the PSF of each beam alone, (beam,)."""
         return self._costs[0]
 
     @cached_property
     def bytes(self) -> np.ndarray:
-        """Predicted memory [bytes] for computing the PSFs of the beams, each computed alone, (beam,)."""
+        """Predicted memory [bytes] for computing the PSF of each beam alone, (beam,)."""
         return self._costs[1]
 
     @cached_property
@@ -196,8 +200,8 @@ def plan_costs(window: Grid, rank: Any, across: Any, finer: Any, crossed: Any = 
         slow factor is the factor by which the diffraction kernel differs from a Fourier kernel.
     across: number of samples along an axis of the pupil.
     finer: number of samples along an axis of a second, finer grid, with which `window_check` estimates the PSF's error.
-    crossed: True if the slow factor is not interpolated, but approximated with a correction by `cross_term`. This takes
-        a second sum over the pupil.
+    crossed: True if the slow factor is not interpolated, but computed by an approximate formula (`cross_term`). The
+        formula takes a second sum over the pupil.
     """
     (height, width), inner = window.shape, rank * across
     products = (inner * inner * width + height * inner * width) * np.where(crossed, 2, 1)

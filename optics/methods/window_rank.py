@@ -61,9 +61,8 @@ class WindowRays:
         that the ray hits, moved outwards along both axes by the distance over which diffraction spreads the light.
         Positions outside the window are then moved to the nearest side of the window.
     weight: weights of the rays, with a mean of 1, (beam, ray). Rays that miss the window have a small weight.
-    mean_sine: weighted root mean square of the x and y components of vector differences, (beam,). For each ray, two
-        unit vectors start in the middle of the window: one points to the start of the ray in the pupil, the other to
-        the pupil's centre. The components are those of their difference.
+    mean_sine: weighted root mean square of the x and y components of d, (beam,). For each ray, d is the unit vector
+        from the middle of the window to the start of the ray in the pupil, minus the unit vector to the pupil's centre.
     """
 
     window: tuple[np.ndarray, np.ndarray]
@@ -96,18 +95,18 @@ def window_ranks(
     tolerance: np.ndarray,
     derivatives: Derivatives | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ranks of the slow factor that the tolerance requires, and whether `cross_term` is used.
+    """Return the number of interpolation points that each PSF needs (the rank), and whether a formula replaces them.
 
     The slow factor is the quotient of the diffraction kernel and a Fourier kernel. It is interpolated between points of
     the window. The rank is the number of these points along an axis. It is 0 if more than MOST_RANK points are needed,
     and 1 if the formula `cross_term` replaces the interpolation. Both results have the shape (beam,).
 
-    The interpolation is tested near the points where the rays hit the window, because the light arrives there. If
-    derivatives are requested, a change of the pupil may send light to any point of the window. The error is then also
-    tested on average over the whole window.
+    The interpolation is tested near the points where the rays hit the window, because the light arrives there.
+    Derivatives describe changes of the pupil, which may send light to any point of the window. If derivatives are
+    requested, the error is therefore also tested on average over the whole window.
 
-    factor: F(u, v) / (F(u, 0) F(0, v)), where F is the slow factor at a position (u, v) of the window. The light comes
-        from the points of the pupils where the rays start.
+    factor: the quotient F(u, v) / (F(u, 0) F(0, v)). F(u, v) is the slow factor at a position (u, v) relative to the
+        middle of the window, for light from the points of the pupils where the rays start.
     tolerance: tolerances of the PSFs, (beam,).
     """
     half, path, directions = geometry.half, factor.path, factor.directions
@@ -135,7 +134,10 @@ def window_ranks(
 
 
 def _errors_anywhere(geometry: WindowGeometry, factor: RemainingFactor, nodes: np.ndarray) -> np.ndarray:
-    """Return `interpolation_errors` on average over the window, (beam,). They do not depend on the light."""
+    """Return root mean square errors of interpolating `factor` between nodes, over the whole window, (beam,).
+
+    The errors are computed at evenly spaced places, and not only where light arrives.
+    """
 
     def computed() -> np.ndarray:
         side = geometry.half * ((np.arange(PLACES) + 0.5) * 2 / PLACES - 1)
@@ -175,5 +177,5 @@ def interpolation_errors(
 
 
 def _rms(wrong: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the weighted root mean square of the absolute values, (beam,)."""
+    """Return the weighted root mean square of the absolute values of `wrong` (beam, ...) for each beam, (beam,)."""
     return np.asarray(np.sqrt((weight * np.square(np.abs(wrong))).mean(axis=tuple(range(1, wrong.ndim)))))

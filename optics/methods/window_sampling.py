@@ -1,9 +1,9 @@
 """The method "low_rank" for a single PSF at coarse tolerances.
 
-The pupil has only as many samples as the light that reaches the window requires. Their number, and the number of
-interpolation points in the window (the rank), are planned as for several PSFs at once (`window_plan`). Both numbers
-are estimates. Every PSF is therefore checked in a few rows and columns of the window, where it is compared with a sum
-over finer samples of the pupil (`window_check`).
+The pupil has only as many samples as the light that reaches the window requires. `window_plan` chooses their number and
+the number of interpolation points in the window (the rank). Both numbers are estimates. Every PSF is therefore checked
+in a few rows and columns of the window, where it is compared with a sum over finer samples of the pupil
+(`window_check`).
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class WindowSampling:
     def plane(self, problem: Problem) -> float:
         """Return the width [m] of the square over which rounding errors are assumed to be evenly spread.
 
-        Their size in the window is estimated from this width, see `Sampling.plane`.
+        The intensity of the rounding errors is estimated from this width, see `Sampling.plane`.
         """
         return problem.wavelength / self.pupil.grid.dx
 

@@ -1,9 +1,9 @@
-"""PSFs of several sources and wavelengths through one pupil, from the same samples of the pupil, at coarse tolerances.
+"""PSFs of several sources and wavelengths through one pupil, at coarse tolerances.
 
-The light behind the pupil is the product of two factors. The first is the wave of the source, bent by the ideal lens
-and attenuated by aperture and mask. The second is the phase that the relief and the wavefront add. The wavefront and
-the height of the relief are computed once for all PSFs, and the second factor once for each wavelength. The sums over
-the pupil are stacked matrix products (`window_sums`).
+All PSFs are computed from the same samples of the pupil. The light behind the pupil is the product of two factors. The
+first is the wave of the source, bent by the ideal lens and attenuated by aperture and mask. The second is the phase
+factor of the relief and the wavefront. The wavefront and the height of the relief are computed once for all PSFs, and
+the second factor once for each wavelength. The sums over the pupil are stacked matrix products (`window_sums`).
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ class WindowStack:
     def errors(self, sampling: WindowSampling, images: Array, tolerance: float) -> Array:
         """Return the relative L2 error of each PSF over the window, see `window_errors`, (source, wavelength).
 
-        images: result of `intensity` without derivatives. The array has the library and the device of the arrays that
-            the attribute `convert` returns.
+        images: result of `intensity` without derivatives, as an array of the library and on the device to which the
+            function `convert` converts arrays.
         tolerance: tolerance of the PSFs.
         """
         seen, finer = (images * self.pupil.area).swapaxes(0, 1), single_stack(sampling.finer)
@@ -85,9 +85,9 @@ class WindowStack:
         return [Path(wave, number(self.distance), self.window) for wave in waves]
 
     def _factors(self, samples: WindowSamples) -> Iterator[tuple[Array, Array | None]]:
-        """Yield factors of the light behind the pupil for each wavelength, see `_product`.
+        """Yield two arrays for each wavelength, from which `_product` computes the light behind the pupil.
 
-        The first factor is the light that a pupil without relief and wavefront would pass, multiplied by the areas of
+        The first array is the light that a pupil without relief and wavefront would pass, multiplied by the areas of
         the samples, (source, η, ξ). The second is the phase of relief and wavefront [waves], (η, ξ); None without
         these. η and ξ count the rows and columns of samples.
         """
@@ -162,7 +162,7 @@ class _LensLight:
 
     @property
     def plain(self) -> _LensLight:
-        """The same light with plain numbers, so that it can be the key of a cache."""
+        """The same light with its parameters as floats without derivatives, so that it can be the key of a cache."""
         focal = None if self.focal_length is None else number(self.focal_length)
         return replace(self, focal_length=focal, sources=tuple(source.plain for source in self.sources))
 
@@ -180,9 +180,9 @@ class _LensLight:
 
 @cached_arrays(MOST_BYTES, lambda waves: waves.nbytes)
 def _fixed_waves(lens: _LensLight, samples: WindowSamples) -> np.ndarray:
-    """Return the result of `_LensLight.waves` at the samples of a pupil, for numbers without derivatives.
+    """Return the result of `_LensLight.waves` at the samples of a pupil, for light without derivatives.
 
-    It is cached, because successive pupils often have the same lens and sources.
+    The result is cached, because successive pupils often have the same lens and sources.
     """
     found: np.ndarray = lens.waves(*samples.layout)
     return found

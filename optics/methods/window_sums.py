@@ -1,4 +1,4 @@
-"""Sums over the pupil for all samples of a window, as stacked matrix products, and their adjoint.
+"""Sums over the pupil for all samples of a window, and the adjoint of these sums, as stacked matrix products.
 
     U[y, x] = Σ_ba Σ_ηξ down[y, bη] P[η, ξ] kernel[b, a, η, ξ] across[x, aξ]
 

@@ -8,7 +8,7 @@ autodiff        Array and Scalar: values that may carry derivatives
 backend         the LLVM library that Dr.Jit compiles with
 device          processor or GPU
 bessel          Bessel functions: J0 of Dr.Jit arrays, Jm of NumPy arrays
-cost            time per operation, from which methods predict their time
+cost            seconds per operation, from which each method predicts its computing time
 even_fields     fields that are even in x and y, stored on a quarter of the plane
 field           a sampled complex field
 fourier         centred Fourier sums of any size and period

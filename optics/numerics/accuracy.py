@@ -64,9 +64,10 @@ class Option:
 class Plan:
     """The chosen method with its samples and predicted error, and the reason for the choice.
 
-    samples: numbers of samples of the pupil (y, x), or numbers of nodes: (radial, angular), or (count, 1).
-    padding: period of the Fourier transform of the pupil, in samples, divided by the number of samples across it.
-        It is 1 if the method uses no periodic transform.
+    samples: numbers of samples of the pupil along (y, x). Methods that sum over nodes of a quadrature rule give the
+        numbers of nodes along (radius, angle), or (number of all nodes, 1) if the nodes form no such grid.
+    padding: period of the Fourier transform of the pupil, in samples, divided by the number of samples across the
+        pupil. It is 1 if the method uses no periodic transform.
     predicted_error: relative L2 error of the intensity over the window.
     scalar_error: upper bound on the error of scalar theory, for light of any polarisation. It depends on the steepest
         ray and adds to `predicted_error`. All methods of `optics.psf` have this error; only `optics.vector_focus`

@@ -125,7 +125,7 @@ def vacuum_wavelength(value: Any) -> float:
 
 
 def vacuum_wavelengths(values: Any) -> np.ndarray:
-    """Return `values` [m] as a float64 array of any shape; the range is that of `vacuum_wavelength`."""
+    """Return `values` [m] as a float64 array of any shape; ValueError if one of them is outside [1e-15, 1]."""
     wavelengths = reals("wavelengths", values)
     for end in (wavelengths.min(), wavelengths.max()) if wavelengths.size else ():
         vacuum_wavelength(end)
@@ -165,7 +165,7 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
 
 
 def one_of(name: str, value: Any, options: Iterable[str]) -> str:
-    """Return `value`; ValueError about `name` unless it is one of the options. The error may suggest a similar one."""
+    """Return `value` if it is one of the options; else raise a ValueError about `name`, which may suggest an option."""
     known = tuple(options)
     if not isinstance(value, str) or value not in known:
         raise ValueError(
@@ -222,7 +222,7 @@ def plain_reals(name: str, values: Any) -> np.ndarray:
 
 
 def complexes(name: str, values: Any) -> np.ndarray:
-    """Return `values` as an array; ValueError about `name` unless they are numbers without derivatives."""
+    """Return `values` as an array; ValueError about `name` if one of them is not a number or carries a derivative."""
     given = as_array(name, without_derivative(name, values))
     if given.dtype.kind not in "biufc":
         raise ValueError(f"{name}: must be numbers, not {shown(values)}")

@@ -52,7 +52,8 @@ def like(x: Array, value: Any) -> Array:
     value: number or array. Derivatives are kept if `value` and `x` belong to the same library, PyTorch or Dr.Jit, and
         dropped if `x` is a NumPy array.
 
-    A Dr.Jit result is flat and is treated as data, so that other values do not need a new kernel.
+    A Dr.Jit result is flat. Its numbers are not compiled into kernels as constants, so that other numbers need no new
+    kernel.
 
     Raises:
         ValueError: `value` carries a derivative of Dr.Jit and `x` is a tensor of PyTorch, or the reverse.
@@ -114,7 +115,7 @@ def indices(x: Array) -> Array:
 def gather(values: Array, at: Any) -> Array:
     """Return one element of `values`, or several. Elements are counted row by row, as in a flat array.
 
-    at: index of the element, or an array of indices that the function `indices` has returned.
+    at: index of the element, or an array of indices in the type that the function `indices` of this module returns.
     """
     own = library(values)
     if own is np:

@@ -1,6 +1,7 @@
 """Predicted times of the Fourier sums that `optics.propagate` computes, over complex NumPy arrays.
 
-Sums of Dr.Jit fields need products of real matrices, which cost twice as much (optics.numerics.fourier_matrices).
+These times do not hold for fields of Dr.Jit. Their sums are computed with products of real matrices, and these products
+take about twice as long (optics.numerics.fourier_matrices).
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def fft_wins(shape_in: Shape, period: float, shape_out: Shape, real: str) -> boo
     The time for computing these matrices is not counted.
 
     shape_in, shape_out: numbers of rows and columns of samples, and of results.
-    period: period of the sum in samples. Fast Fourier transforms require a whole number.
+    period: period of the sum in samples. Fast Fourier transforms require a period that is a whole number.
     real: type of real and imaginary parts, "float32" or "float64".
     """
     if not float(period).is_integer():

@@ -86,10 +86,10 @@ def carries_derivative(value: Any) -> bool:
 
 
 def entries(row: Any) -> Any:
-    """Return a row of numbers; a tensor of PyTorch that requires a gradient becomes a tuple of its entries.
+    """Return `row`, or a tuple of its entries if it is a tensor of PyTorch that requires a gradient.
 
-    Each entry is then a tensor of its own, through which gradients flow back to the row. The numbers of all entries are
-    copied to the host together.
+    Each entry of the tuple is a tensor of its own, through which gradients flow back to the row. The values of all
+    entries are copied to the host together.
     """
     if not of_torch(row) or row.ndim == 0:
         return row

@@ -92,7 +92,8 @@ def candidates() -> Iterator[str]:
 def _version_in_name(path: str) -> tuple[int, ...]:
     """Return the version in the name of an LLVM library, such as (19, 1) for libLLVM.so.19.1.
 
-    It is (15,) for libLLVM-15.so.1. A number at the end of such a name is the ABI number, not the version.
+    It is (15,) for libLLVM-15.so.1. If a number follows "libLLVM-", as here, the number at the end is the ABI number,
+    not the version.
     """
     match = re.search(r"libLLVM(?:-(\d+(?:\.\d+)*))?\.(?:so|dylib)(?:\.(\d+(?:\.\d+)*))?", os.path.basename(path))
     digits = (match.group(1) or match.group(2) or "0") if match else "0"

@@ -1,12 +1,13 @@
 """Fields that are even in x and y, stored on a quarter of the plane, and their Fourier sums.
 
-In sums over an even field, only the cosine of the factor exp(2πi jk/period) contributes. A sum therefore takes a
-sixteenth of the products. A phase factor e^{iφ} is computed only on the quarter, so it takes a quarter of the sines and
+In sums over an even field, only the cosine of the factor exp(2πi jk/period) contributes. A sum by matrices therefore
+takes a sixteenth of the real multiplications: halved numbers of rows and columns reduce them to an eighth, and real
+cosines halve them again. A phase factor e^{iφ} is computed only on the quarter, so it takes a quarter of the sines and
 cosines.
 
-Sample n//2 is the centre. If n is even, one side has one more sample than the other. The quarter extends from the
-centre to the last sample of the longer side. This sample has no mirror image on the shorter side, so its weight is
-halved.
+Sample n//2 of the n samples along an axis is the centre. If n is even, there is one more sample before the centre than
+after it. The quarter extends from the centre to the last sample of the longer side. This sample has no mirror image on
+the shorter side, so its weight is halved.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid, first: int 
 
     j and k are counted from the centre sample, as in `fourier.dft2`. Along each axis, the field and the result contain
     only the samples from the centre to one end, see `quarter`. If the number of samples is even, one side of the centre
-    has one more sample than the other, and the samples of this longer side are contained.
+    has one more sample than the other. The field and the result then contain the samples of this longer side.
 
     field: u on the quarter of a plane of `shape` samples, or on some rows of this quarter, which start at row `first`.
     """

@@ -4,10 +4,10 @@
 
     U[k] = Σ_j u[j] exp(± 2πi j·k / period),   j and k counted from the centre sample n//2.
 
-The period may have any value, because a matrix DFT can have any output pitch. If the period is a whole number, the FFT
-can be used instead. `dft2` selects the faster of the two by their predicted times (optics.numerics.cost). Dr.Jit's
-matrix product executes more operations per second, but SciPy's FFT needs fewer, so matrices are faster for small
-windows, and the FFT for large ones. In `dft2`, both are differentiable.
+Products with matrices compute the sum for any period. If the period is a whole number, the FFT can be used instead.
+`dft2` selects the faster of the two by their predicted times (optics.numerics.cost). Dr.Jit's matrix product executes
+more operations per second, but SciPy's FFT needs fewer, so matrices are faster for small windows, and the FFT for large
+ones. In `dft2`, both are differentiable.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ AT_A_TIME, FEWEST_LINES = 2**17, 16  # choice: samples transformed at once (a me
 def fast_length(least: float) -> int:
     """Return a length of at least `least` for which the FFT is fast: the smallest integer of the form 2^a 3^b 5^c.
 
-    Beyond LONGEST_FFT, the result is `least`, rounded up, because no FFT is used there.
+    If `least` is above LONGEST_FFT, the result is `least`, rounded up, because no FFT is used for such lengths.
     """
     if least > LONGEST_FFT:
         return ceil(least)  # no FFT is used for such lengths
@@ -122,8 +122,8 @@ def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
 def periodic_spectrum(u: np.ndarray, period: int, across: int) -> np.ndarray:
     """Return Σ_j u[j] exp(-2πi j·k / period) for a complex NumPy array u (y, x) that is at most one period wide.
 
-    The result is (fx, fy) in FFT order: all frequencies fy, but only the `across` frequencies fx nearest 0, which are
-    `kept_indices(across)`. fy is the last axis, because transforms of contiguous lines are twice as fast.
+    The result (fx, fy) contains all frequencies fy, but only the `across` frequencies fx nearest 0, both in FFT order.
+    The last axis is fy, because the last FFT, along y, is twice as fast if its lines are contiguous in memory.
     """
     from scipy import fft
 
@@ -134,9 +134,9 @@ def periodic_spectrum(u: np.ndarray, period: int, across: int) -> np.ndarray:
 
 
 def periodic_sum(spectrum: np.ndarray, period: int, step: int, shape: tuple[int, int]) -> np.ndarray:
-    """Return Σ_k U[k] exp(2πi j·k / period) as an array (y, x), at every `step`-th j around the centre.
+    """Return Σ_k U[k] exp(2πi j·k / period) at every `step`-th j, with j = 0 at sample n//2 of the result, (y, x).
 
-    spectrum: as returned by `periodic_spectrum`.
+    spectrum: U as returned by `periodic_spectrum`.
     """
     from scipy import fft
 
@@ -152,7 +152,7 @@ def periodic_sum(spectrum: np.ndarray, period: int, step: int, shape: tuple[int,
 
 
 def kept_indices(across: int) -> np.ndarray:
-    """Return the `across` indices nearest 0 in FFT order, 0, 1, …, -2, -1, where -1 is the last sample of a period."""
+    """Return the `across` indices nearest 0. They are in FFT order: 0, 1, …, -2, -1 (-1: last sample of a period)."""
     kept = np.arange(across) - across // 2
     return np.roll(kept, -(across // 2))
 
@@ -212,7 +212,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
 def _fft_of_parts(
     parts: tuple[np.ndarray, np.ndarray], period: int, to: tuple[int, int], sign: int, types: Precision
 ) -> tuple[Array, Array]:
-    """Return the Fourier sum of `dft2`, by FFTs, as flat real and imaginary part. `parts`: the same parts of the field.
+    """Return the real and imaginary part, flat, of the sum of `dft2`, by FFTs. parts: real and imaginary part of u.
 
     The FFTs are computed for blocks of lines, because a whole plane, padded to one period, exceeds the cache.
     """
@@ -242,7 +242,7 @@ def _fft_of_parts(
 
 
 def _lines(n: int, period: int) -> list[slice]:
-    """Return slices that divide n lines of `period` samples into blocks, whose FFTs are computed together."""
+    """Return slices that divide n lines of `period` samples into blocks of lines that are transformed together."""
     step = max(FEWEST_LINES, AT_A_TIME // period)
     return [slice(start, min(start + step, n)) for start in range(0, n, step)]
 
@@ -262,7 +262,7 @@ def _runs(n: int, period: int) -> list[tuple[slice, slice]]:
 
 
 def _fft_axis(u: np.ndarray, period: int, n_out: int, sign: int, axis: int) -> np.ndarray:
-    """Return the sum along one axis: wrap the samples into one period, transform, and select n_out centred samples."""
+    """Return the Fourier sum along one axis at n_out centred samples, by an FFT of u, wrapped into one period."""
     from scipy import fft
 
     wrapped = _wrap(u, period, axis)

@@ -67,7 +67,7 @@ def by_whole_matrices(field: Field, period: Scalar, shape: Shape, sign: int) -> 
 
 
 def _matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) -> Parts:
-    """Return exp(±2πi k j / period) in row k and column j, both counted from n//2.
+    """Return the matrix exp(±2πi k j / period), where k = row - n_out//2 and j = column - n_in//2.
 
     The result is two tensors: real and imaginary part.
     """
@@ -78,10 +78,11 @@ def _matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) 
 
 
 def by_halves(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
-    """Return the same Fourier sum as `by_whole_matrices`, by real matrices with a quarter of the entries.
+    """Return the same Fourier sum as `by_whole_matrices`, computed with smaller, real matrices.
 
-    These are matrices of cosines, multiplied by u[j] + u[-j], and of sines, multiplied by u[j] - u[-j], for j >= 0. The
-    sum along x is computed first, then the sum along y.
+    Each matrix has a quarter of the entries of the complex Fourier matrix. A matrix of cosines multiplies u[j] + u[-j],
+    and a matrix of sines multiplies u[j] - u[-j]. Here u is the field, and samples j >= 0 are counted from the centre.
+    The sum along x is computed first, then the sum along y.
     """
     types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
     cosine, sine = along_y = _quarter(types, mx, nx, period, sign)
@@ -106,7 +107,8 @@ def _quarter(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int)
 def _folded_columns(field: Field) -> tuple[list[Array], list[Array]]:
     """Return [re, im] of u[y, j] + u[y, -j], and of u[y, j] - u[y, -j], for columns j >= 0 counted from the middle.
 
-    At j = 0, the sum is u[y, 0], not twice this value, because the first term is replaced by 0.
+    At j = 0, the term u[y, j] is replaced by 0 in both, so that the sum is u[y, 0], not twice this value. The
+    difference at j = 0 does not matter, because sin 0 multiplies it.
     """
     types, (ny, nx) = field.types, field.evaluated().grid.shape
     shape = ny, nx // 2 + 1
@@ -122,12 +124,12 @@ def _folded_rows(across: list[Array], size: Shape, types: Precision) -> tuple[li
     """Return v[j, k] + v[-j, k] and v[j, k] - v[-j, k], where v is the Fourier sum of a field along x alone.
 
     The row j >= 0 is counted from the middle row of the field. k is the frequency along x, of either sign. Each result
-    is a list of real and imaginary part, (j, k). At j = 0, the sum is v[0, k], not twice this value, because the first
-    term is replaced by 0.
+    is a list of real and imaginary part, (j, k). At j = 0, the term v[j, k] is replaced by 0 in both, so that the sum
+    is v[0, k], not twice this value.
 
-    across: four tensors (row, |k|), from which `_both_sides` computes v for k of either sign. The first two are the
-        real and imaginary part of the sum along x of cosines times the part of the field that is even in x. The last
-        two are those of the sum of sines times the odd part.
+    across: four tensors (row, |k|), from which `_both_sides` computes v for k of either sign. Let e be the part of the
+        field that is even in x, and o the odd part. The first two tensors are the real and imaginary part of the sum of
+        e · cosine along x, and the last two are the real and imaginary part of the sum of o · sine along x.
     size: number of rows of the field, and number of frequencies k.
     """
     ny, mx = size
@@ -158,11 +160,12 @@ def _unfolded_rows(down: list[Array], shape: Shape, types: Precision) -> Parts:
 def _both_sides(halves: list[Array], place: Array, k: Array, types: Precision, there: Array = True) -> Parts:
     """Return the real and imaginary part of C + iS if k >= 0, and of C - iS if k < 0.
 
-    C is the sum of cosines times the even part of a field, and S the sum of sines times its odd part, both for |k|.
+    C is the sum of the even part of a field times cos(2πj|k|/period) over its samples j. S is the sum of its odd part
+    times ± sin(2πj|k|/period).
 
-    halves: real and imaginary part of C, followed by those of S.
-    place: flat index in these arrays for each entry of the result.
-    there: mask of the entries to be read; all others are 0.
+    halves: four arrays: real and imaginary part of C, followed by those of S.
+    place: for each entry of the result, the flat index at which the four arrays are read.
+    there: mask of the result. Where it is False, the result is 0.
     """
     import drjit as dr
 
@@ -172,13 +175,13 @@ def _both_sides(halves: list[Array], place: Array, k: Array, types: Precision, t
 
 
 def _read(part: Array, ahead: Array, behind: Array, there: Array) -> Parts:
-    """Return the elements at the indices `ahead` (0 where the mask `there` is False), and those at `behind`."""
+    """Return two arrays: part[ahead], with 0 where the mask `there` is False, and part[behind], without a mask."""
     import drjit as dr
 
     return dr.gather(type(part), part, ahead, there), dr.gather(type(part), part, behind)
 
 
 def _counted(shape: Shape, types: Precision) -> Parts:
-    """Return column and row of every entry, counted from 0, in float64."""
+    """Return the column and the row of every entry of an array of this shape, counted from 0, in float64, flat."""
     x, y = Grid(shape, 1.0).coordinates(types)
     return x + opaque(types, shape[1] // 2), y + opaque(types, shape[0] // 2)

@@ -81,12 +81,12 @@ class Grid:
 
     @property
     def half_width(self) -> float:
-        """Upper bound of the distance of a sample from the origin along an axis; exact if the grid is centred there."""
+        """Upper bound of a sample's distance from the origin along an axis; exact for a grid centred on the origin."""
         return max(abs(middle) + n // 2 * self.dx for middle, n in zip(self.centre, self.shape[::-1], strict=True))
 
     @property
     def half_diagonal(self) -> float:
-        """Upper bound of the distance of a sample from the origin; exact if the grid is centred there."""
+        """Upper bound of a sample's distance from the origin; exact for a grid centred on the origin."""
         x, y = (abs(middle) + n // 2 * self.dx for middle, n in zip(self.centre, self.shape[::-1], strict=True))
         return float(np.hypot(x, y))
 

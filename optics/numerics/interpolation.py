@@ -83,7 +83,10 @@ class Interpolant:
         return cls(ends[0], step * half, samples)
 
     def at(self, place: Array, types: Precision) -> Array:
-        """Return interpolated values at positions in a flat Dr.Jit Float64 array. The result is differentiable."""
+        """Return the function's interpolated values at positions, as a flat array. The result is differentiable.
+
+        place: positions, a flat Dr.Jit Float64 array.
+        """
         import drjit as dr
 
         last = opaque(types, len(self.samples) - 2 * MARGIN - 1)
@@ -108,7 +111,7 @@ def _cosine_sums(values: np.ndarray) -> np.ndarray:
 
 
 def lagrange_weights(t: Array, taps: int) -> list[Array]:
-    """Return the weights of Lagrange interpolation at t from an even number `taps` of samples at distances of 1.
+    """Return the weights of Lagrange interpolation at t from an even number `taps` of samples, spaced 1 apart.
 
         L_i(t) = Π_{j≠i} (t - x_j) / (x_i - x_j),   x_i = i + 1 - taps/2,   i = 0 ... taps - 1.
 
@@ -140,7 +143,10 @@ def cubic_bsplines(t: Array) -> list[Array]:
 
 
 def tensor_product(value: Callable[[int, int], Array], across: list[Array], along: list[Array]) -> Array:
-    """Return Σ_ij a_i b_j value(i, j), with the weights a_i = along[i] along y and b_j = across[j] along x."""
+    """Return Σ_ij a_i b_j value(i, j), a sum over the samples in rows i and columns j.
+
+    The weights a_i of the rows are in the list `along`, and the weights b_j of the columns in the list `across`.
+    """
     total = 0.0
     for i, down in enumerate(along):
         line = 0.0

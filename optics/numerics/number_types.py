@@ -56,8 +56,8 @@ def readable(name: str, value: Any) -> Any:
 def full_precision(name: str, value: Any) -> Any:
     """Return `value`, converted by `readable`; ValueError if it, or an entry of it, is less precise than float32.
 
-    `readable` converts tensors of PyTorch that NumPy cannot read. Near 1 µm, the step of float16 is 60 nm, a tenth of a
-    wavelength.
+    `readable` converts tensors of PyTorch that NumPy cannot read. Less precise types are too coarse for optics: near
+    1 µm, successive numbers of float16 are 60 nm apart, a tenth of a wavelength.
     """
     kind = _half(value)
     if kind:
@@ -95,8 +95,9 @@ def real_array(name: str, value: Any) -> np.ndarray | None:
 def all_finite(array: np.ndarray) -> bool:
     """Return True if every number in the array is finite.
 
-    NaN and infinity propagate through a sum of squares, which takes a fifth of the time of a test of each number. The
-    numbers are only tested if the sum is not finite, because it may overflow.
+    The sum of their squares is tested first, because NaN and infinity propagate through it, and it takes a fifth of
+    the time of a test of each number. If this sum is not finite, each number is tested, because a sum of squares of
+    finite numbers may overflow.
     """
     flat = array.ravel()  # copied once, if at all; np.vdot would copy both arguments
     return math.isfinite(np.vdot(flat, flat)) or bool(np.isfinite(flat).all())

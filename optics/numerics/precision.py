@@ -74,8 +74,8 @@ def padded_for_packets(values: np.ndarray) -> np.ndarray:
     """Return a flat copy of an array, in aligned memory that can be read beyond the end of the copy.
 
     Dr.Jit uses NumPy's memory without a copy. Its kernels read whole packets of numbers, sixteen with AVX-512, and
-    ignore the numbers beyond the end. If the next memory page is not mapped, reading it crashes the process. This can
-    happen with arrays of some megabytes (observed with Dr.Jit 1.5 and 2087 x 2087 numbers).
+    ignore the numbers beyond the array's end. If these lie in a memory page that is not mapped, reading them crashes
+    the process. This can happen with arrays of some megabytes (observed with Dr.Jit 1.5 and 2087 x 2087 numbers).
     """
     flat = aligned(values.size, values.dtype)
     flat.reshape(values.shape)[...] = values

@@ -116,8 +116,9 @@ def _legendre(n: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def stepped_up(cycles: float) -> float:
-    """Return a number of cycles, rounded up to one of 16 values per octave; 0 if it is not positive.
+    """Return a wave's number of cycles, rounded up to one of 16 values per octave; 0 if it is not positive.
 
-    Waves with similar numbers of cycles then share one cached result, such as a quadrature rule.
+    Waves with similar numbers of cycles then have the same number, and share one cached result, such as a quadrature
+    rule.
     """
     return 2.0 ** (ceil(STEPS * log2(cycles) - 1e-9) / STEPS) if cycles > 0 else 0.0

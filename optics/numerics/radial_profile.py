@@ -47,11 +47,13 @@ class RadialProfile:
     def resolving(cls, rim: float, band: float, distance: float, error: float) -> RadialProfile:
         """Return a profile that resolves spatial frequencies up to `band` [1/m] with a relative error of about `error`.
 
-        The number of Chebyshev points follows from the decay of the image's Chebyshev coefficients with their order m
-        over [-R, R], where R is the profile's `radius`. The coefficients of a wave of frequency b are 2 J_m(2πbR).
-        Obliquity factors have poles at r = ±iz, with the `distance` z [m] from the pupil, so their coefficients fall
-        like e^{-m asinh(z / R)}. The pitch h of the table follows from the error of eight-point interpolation,
-        LAGRANGE_8 (2πbh)⁸.
+        The image is expanded in Chebyshev polynomials of order m on [-R, R], where R is the profile's `radius`. The
+        number of Chebyshev points follows from the decay of the coefficients with m. The coefficients of a wave of
+        frequency b are 2 J_m(2πbR). Obliquity factors have poles at r = ±iz, where z is the image's `distance` [m] from
+        the pupil, so their coefficients fall like e^{-m asinh(z / R)}.
+
+        The image is interpolated onto the grid from a table at evenly spaced radii. The spacing h of these radii
+        follows from the error of eight-point interpolation, LAGRANGE_8 (2πbh)⁸.
         """
         digits = -math.log10(error)
         turns = 2 * math.pi * band * rim + 2 * rim / distance
@@ -93,8 +95,8 @@ class RadialProfile:
     def positions(self) -> np.ndarray:
         """Radii [m] at which the image is computed: Chebyshev points or, if `is_table`, evenly spaced radii.
 
-        The evenly spaced radii begin beyond the axis, where they are negative and their absolute values are given. They
-        end beyond the rim.
+        The first three of the evenly spaced radii lie on the other side of the axis. They are given as positive
+        numbers, because the image is the same there. The last four lie beyond the rim.
         """
         if self.is_table:
             return np.abs(self.rim * _places(self.table))
@@ -130,9 +132,10 @@ class RadialProfile:
 class DistinctRadii:
     """The distinct radii of a window's samples, at which the image is computed without interpolation.
 
-    They are used if a window has few samples for the structure that it contains.
+    They are used if interpolation along a radius (`RadialProfile`) would need as many radii as the window has samples,
+    or more.
 
-    A square of 33 x 33 or more samples about the axis has fewer distinct radii than an eighth of its samples.
+    A square of 33 x 33 or more samples about the axis has more than eight samples for each distinct radius.
     """
 
     window: Grid
@@ -168,7 +171,7 @@ class DistinctRadii:
 
 
 def _distinct(window: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distinct radii [m] and, for every sample, the index of its radius, flat."""
+    """Return the distinct radii [m], (radius,), and for every sample the index of its radius, (sample,)."""
     squared = np.add.outer(np.square(window.y), np.square(window.x)).ravel() / window.dx**2
     # Squared radii are rounded, because rounding errors would make equal radii distinct.
     found, which = np.unique(np.round(squared, 6), return_inverse=True)
@@ -179,9 +182,9 @@ _small_distinct, _large_distinct = (lru_cache(maxsize=count)(_distinct) for coun
 
 
 def _places(table: int) -> np.ndarray:
-    """Return evenly spaced radii of an image, as fractions of the radius of its rim.
+    """Return evenly spaced radii for a table of an image, in units of the image's largest radius, its rim.
 
-    Three of them lie beyond the axis, where they are negative, and four beyond the rim.
+    The first three radii are negative, and the last four exceed 1.
 
     table: number of radii from the axis (0) to the rim (1), both included.
     """

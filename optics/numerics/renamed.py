@@ -16,7 +16,9 @@ def warn_renamed(old: str, new: str, stacklevel: int = 3) -> None:
 
 
 def warn_once(subject: str, message: str, stacklevel: int = 4) -> None:
-    """Issue a warning that a name or the form of a call changes. It is issued once per process for each subject.
+    """Warn that a name changes, or that a function must be called in another form.
+
+    The warning is issued once per process for each subject.
 
     subject: the old name, or a text that identifies the call, such as "heights of optics.torch".
     """

@@ -2,11 +2,11 @@
 
 Each point is spread over a few cells of a finer grid, which is then transformed.
 
-    S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)},   u(j) = Σ_k S_k e^{2πi (p_j k_x + q_j k_y)},   k counted from n//2.
+    S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)},   u(j) = Σ_k S_k e^{2πi (p_j k_x + q_j k_y)}.
 
-The spreading kernel is e^{β(√(1 - z²) - 1)} (Barnett, Magland & af Klinteberg, SIAM J. Sci. Comput. 41, C479, 2019).
-The finer grid is periodic, with at least two cells per sample of the sum. The result is divided by the transform of the
-kernel.
+Along an axis with n samples, k runs from -(n//2) in steps of 1. The spreading kernel is e^{β(√(1 - z²) - 1)} (Barnett,
+Magland & af Klinteberg, SIAM J. Sci. Comput. 41, C479, 2019). The finer grid is periodic, and has at least twice as
+many cells along each axis as the grid has samples. The result is divided by the transform of the kernel.
 """
 
 from __future__ import annotations
@@ -30,12 +30,14 @@ TRANSFORM_NODES = 40
 
 
 class ScatteredSum:
-    """Fourier sums over scattered points at the samples of a grid, and sums over these samples at the points.
+    """Fourier sums between scattered points and the samples of a grid, in both directions.
 
-    The sum over points j with amplitudes u_j is S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)}, at the sample with the
-    indices k. The sum over samples is its transpose, with the same exponential.
+    For the sample with the indices k, the sum over the points j with amplitudes u_j is
+    S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)}. For the point j, the sum over the samples with values S_k is
+    Σ_k S_k e^{2πi (p_j k_x + q_j k_y)}.
 
-    p, q: coordinates of the points, (point,): the turns of the phase, each of 2π, from one sample to the next.
+    p, q: coordinates of the points along x and y, (point,). From one sample to the next, the phase changes by 2πp or
+        2πq.
     shape: number of samples (y, x) of the grid.
     digits: number of accurate digits of the sums, relative to Σ|u|.
     """
@@ -57,15 +59,18 @@ class ScatteredSum:
         self.first = low_y + self.held[0] // 2, low_x + self.held[1] // 2
 
     def evaluate(self, u: np.ndarray) -> np.ndarray:
-        """Return the Fourier sums S (sum, y, x), complex, for amplitudes u of the points (sum, point)."""
+        """Return the complex Fourier sums over the scattered points at each sample of the grid, (sum, y, x).
+
+        u: amplitudes of the points, (sum, point).
+        """
         held = (self.cells.T @ np.ascontiguousarray(u.T)).T.reshape(len(u), *self.held)
         found = np.stack([fourier_sum(np.ascontiguousarray(one), self.period, self.shape, 1) for one in held])
         return found * self._factor()
 
     def at(self, samples: np.ndarray) -> np.ndarray:
-        """Return the sums over the grid's samples k at each scattered point j, complex, (sum, point).
+        """Return the complex sum over the grid's samples for each scattered point, (sum, point).
 
-        The sums are Σ_k S_k e^{2πi (p_j k_x + q_j k_y)}, the transpose of those that `evaluate` returns.
+        For the point j, it is Σ_k S_k e^{2πi (p_j k_x + q_j k_y)}. This linear map is the transpose of `evaluate`.
 
         samples: values S at the samples, (sum, y, x).
         """
@@ -92,7 +97,8 @@ class ScatteredSum:
 def sums_at(sums: ScatteredSum, samples: Array) -> tuple[Array, Array]:
     """Return the real and imaginary part of `sums.at` for real values at the grid's samples, with derivatives.
 
-    `sums.at` computes sums over the samples at scattered points. Both parts are flat Float64 arrays (sum, point).
+    For each scattered point, `sums.at` computes a Fourier sum over the samples. Both parts are flat Float64 arrays
+    (sum, point).
     """
     import drjit as dr
 
@@ -120,9 +126,10 @@ def sums_at(sums: ScatteredSum, samples: Array) -> tuple[Array, Array]:
 
 
 def _spread(turns: np.ndarray, period: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first cell over which a kernel spreads each point along an axis, and the weights (point, cell).
+    """Return the cells over which a kernel spreads each point along one axis: the first cell, and the cells' weights.
 
-    The cells are the squares of the finer, periodic grid on which Fourier sums over points are computed.
+    A Fourier sum over scattered points is computed on a periodic grid, after each point has been spread over a few
+    neighbouring squares of this grid, the cells. The first cells are (point,), and the weights (point, cell).
 
     turns: coordinate of each point, in units of the grid's period.
     period: number of cells in the grid.
@@ -136,11 +143,11 @@ def _spread(turns: np.ndarray, period: int, width: int) -> tuple[np.ndarray, np.
 
 @lru_cache(maxsize=64)
 def _transform(width: int, period: int, n: int) -> np.ndarray:
-    """Return the Fourier transform of the kernel that spreads a point over cells, for one axis.
+    """Return the Fourier transform of the kernel that spreads points over the cells of a periodic grid, for one axis.
 
     width: width of the kernel in cells.
-    period: number of cells in the finer, periodic grid.
-    n: number of samples of the Fourier sums along this axis. Their indices k are the frequencies of the result.
+    period: number of cells in the grid along the axis.
+    n: number of frequencies. They are the whole numbers k from -(n//2), in cycles per period of the grid.
     """
     node, weight = gauss_legendre(TRANSFORM_NODES)
     z, weight = 2 * node - 1, width * weight

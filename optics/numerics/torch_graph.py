@@ -52,7 +52,7 @@ def once(numbers: Mapping[str, torch.Tensor], values: Mapping[str, Any]) -> dict
 
 
 class DrJitOperation(torch.autograd.Function):
-    """A function of Dr.Jit arrays as an operation of PyTorch. Its graph serves any number of backward passes."""
+    """A function of Dr.Jit arrays as an operation of PyTorch, whose backward pass can be repeated."""
 
     @staticmethod
     def forward(ctx: Any, function: Callable[[list[Array]], Array], *numbers: Any) -> Any:
@@ -121,7 +121,7 @@ def torch_place() -> str:
 def common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
     """Return the device of all tensors, or the CPU if there are none; ValueError if their devices differ.
 
-    Single numbers on the CPU fit any device.
+    Single numbers on the CPU are not considered, because PyTorch combines them with tensors on any device.
     """
     places = {name: t.device for name, t in numbers.items() if t.ndim or t.device.type != "cpu"}
     for first, known in places.items():
@@ -135,9 +135,10 @@ def common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
 def computing_device(numbers: Mapping[str, torch.Tensor], otherwise: torch.device) -> torch.device:
     """Return the device on which PyTorch computes with these tensors.
 
-    It is the device that the tensors share. Single numbers on the CPU are not considered, because they fit any device.
-    If the tensors are on several devices, or only such single numbers are given, it is `otherwise`. If the device found
-    in this way is of the type cpu, mps or meta, the device on which Dr.Jit computes is returned instead.
+    This is the device that the tensors share. Single numbers on the CPU are not considered, because PyTorch combines
+    them with tensors on any device. If the tensors are on several devices, or only such single numbers are given, the
+    device is the argument `otherwise`. If the device found in this way is of the type cpu, mps or meta, the device on
+    which Dr.Jit computes is returned instead.
     """
     places = {tensor.device for tensor in numbers.values() if tensor.ndim or tensor.device.type != "cpu"}
     found = places.pop() if len(places) == 1 else otherwise

@@ -59,9 +59,9 @@ def acceptance_function(ommatidium: Ommatidium, wavelengths: np.ndarray, loss: f
     """Return the acceptance function of an ommatidium: its sensitivity on a grid of directions.
 
     Calls with the same ommatidium and with equal wavelengths and loss return the same object. The grid is widened
-    until, at each wavelength, it contains all but the fraction `loss` of the light that the modes accept from all
-    directions. It extends at most to sines of ±0.5 along each axis. If the ommatidium accepts light from a wider field,
-    the grid misses more light than `loss`.
+    until, at each wavelength, it contains all but the fraction `loss` of the light that the waveguide modes of the
+    rhabdom accept from all directions. It extends at most to sines of ±0.5 along each axis. If the ommatidium accepts
+    light from a wider field, the grid misses more light than `loss`.
 
     wavelengths: vacuum wavelengths [m], (band,).
     loss: fraction in [1e-5, 0.1].

@@ -7,8 +7,8 @@ Rayleigh-Sommerfeld integral over the pupil, and the order of the two integrals 
 
 P is the amplitude that the pupil transmits, D the distance from x to ξ, and z the distance from the pupil to the end of
 the waveguide. The wavenumber is k₀ in front of the pupil, and k behind it. Each mode is propagated back to the pupil
-once. The amplitudes for all directions s (sines) then follow from one Fourier sum. A waveguide off the pupil's axis
-points at the pupil's centre. The module `radiation` computes Ψ.
+once. The amplitudes for all directions then follow from one Fourier sum. A direction s is given by its sines along x
+and y. A waveguide off the pupil's axis points at the pupil's centre. The module `radiation` computes Ψ.
 """
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ class ModesAtPupil:
     def power(self, sine_x: np.ndarray, sine_y: np.ndarray) -> np.ndarray:
         """Return the fraction of the light on the pupil that enters each mode, (mode, direction).
 
-        sine_x, sine_y: sines of the light's directions, relative to the sines of the direction of the beam's source.
+        sine_x, sine_y: sines of the light's directions along x and y, minus those of the direction of the beam's
+            source.
         """
         sx, sy = np.ravel(sine_x), np.ravel(sine_y)
         found = np.empty((len(self.weights), sx.size))
@@ -67,11 +68,12 @@ class ModesAtPupil:
         return found
 
     def power_on(self, sines: Grid, taken: np.ndarray, digits: float = DIGITS) -> np.ndarray:
-        """Return the fraction of the pupil's light that each mode accepts, times its weight, summed over modes, (y, x).
+        """Return a weighted sum over modes of the fraction of the pupil's light that enters each mode, (y, x).
 
-        sines: grid of sines of the light's directions, relative to the sines of the beam's source.
+        sines: grid of directions: sines of the light's direction along x and y, minus those of the direction of the
+            beam's source.
         taken: weight of each mode, for example the fraction of its light that is absorbed.
-        digits: digits of the Fourier sum.
+        digits: number of accurate digits of the Fourier sum.
         """
         per_sample = self.wavenumber / (2 * math.pi) * sines.dx
         sums = ScatteredSum(self.x * per_sample, self.y * per_sample, sines.shape, digits)
@@ -84,12 +86,12 @@ class ModesAtPupil:
         return found / self.area
 
     def total(self, taken: np.ndarray) -> float:
-        """Return the integral of `power_on` over the sines of all directions of the light.
+        """Return the integral of `power_on` over all directions of the light: over their sines along x and y.
 
-        `power_on` is the fraction of the pupil's light that each mode accepts, times the mode's weight, summed over
-        modes. By Parseval's theorem, the integral for one mode is (λ/n₀)² Σ |P Ψ|² dξ / area. λ/n₀ is the wavelength in
-        front of the pupil, P the amplitude that the pupil transmits, and Ψ the mode's field at a node with the area dξ.
-        The sum is over the nodes, for which `weights` contains P Ψ dξ.
+        `power_on` is a weighted sum over modes of the fraction of the pupil's light that enters each mode. By
+        Parseval's theorem, the integral for one mode is (λ/n₀)² Σ |P Ψ|² dξ / area. λ/n₀ is the wavelength in front of
+        the pupil, P the amplitude that the pupil transmits, and Ψ the mode's field at a node with the area dξ. The sum
+        is over all nodes. The attribute `weights` contains P Ψ dξ for each mode and node.
 
         taken: weight of each mode.
         """
@@ -104,12 +106,12 @@ def modes_at_pupil(
     place: tuple[float, float] = (0.0, 0.0),
     digits: float = DIGITS,
 ) -> ModesAtPupil:
-    """Propagate modes of a waveguide back to the pupil. The waveguide's end lies at `beam.distance` behind it.
+    """Propagate modes of a waveguide back to the pupil. The waveguide's end lies at `beam.distance` behind the pupil.
 
-    steepest: largest difference between the sines of the light's direction and those of the direction of the beam's
-        source.
+    steepest: length of the longest vector (x, y) of the sines of a direction of light, minus those of the direction of
+        the beam's source.
     place: position (x, y) [m] of the waveguide's end, relative to the pupil's axis.
-    digits: digits of the sums over the pupil.
+    digits: number of accurate digits of the sums over the pupil.
 
     Raises:
         ValueError: the pupil's relief is a `PixelRelief`, or an argument carries a derivative.

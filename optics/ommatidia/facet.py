@@ -70,7 +70,10 @@ class FacetLens:
         return front + back - self.thickness / n * front * back
 
     def focal_length(self, wavelength: float = MIDDLE) -> float:
-        """Return the focal length [m] from the second principal plane: the index of the cone, divided by the power."""
+        """Return the focal length [m] behind the lens, measured from the second principal plane.
+
+        It is the index of the crystalline cone behind the lens, divided by the power of the lens.
+        """
         return self._index("medium_n", wavelength) / self.power(wavelength)
 
     def object_focal_length(self, wavelength: float = MIDDLE) -> float:
@@ -90,9 +93,11 @@ class FacetLens:
         return first, second
 
     def pupil(self, wavelength: float = MIDDLE, **others: Any) -> Pupil:
-        """Return the equivalent pupil in the principal planes: the facet with an ideal lens.
+        """Return a pupil that replaces the thick lens by an ideal thin lens in an opening of the facet's shape.
 
-        For light of all wavelengths, the ideal lens has the focal length of this lens at `wavelength` [m].
+        Distances in front of the pupil are measured from the first principal plane, distances behind it from the
+        second. The ideal lens has one focal length for light of all wavelengths: that of the facet lens at `wavelength`
+        [m].
 
         others: further arguments of `Pupil`, such as a wavefront for the lens' aberrations.
 

@@ -25,7 +25,8 @@ MOST = 2**22  # choice: largest number of directions at which a radiance is eval
 def hexagonal_directions(rings: int, interommatidial_deg: float) -> np.ndarray:
     """Return the viewing directions (n, 2) of ommatidia in hexagonal rings about the axis: angles [rad] along x and y.
 
-    The angle between neighbours is Δφ, and rows run along x. There are n = 1 + 3 rings (rings + 1) directions.
+    The angle between neighbours is Δφ, and rows run along x. The number of directions is n = 1 + 3N(N + 1), where N is
+    the number of `rings`.
 
     interommatidial_deg: Δφ [degrees].
 
@@ -70,9 +71,9 @@ class AppositionEye:
     def field(self, wavelength: float = 500e-9) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return directions x, y [rad] relative to the ommatidium's axis, flat, and their weights, which sum to 1.
 
-        The directions are every second sample of `acceptance_function`. They end at the latest at sines of ±0.5 along
-        each axis. They contain at least 99 % of the light that the ommatidium accepts, unless more than 1 % comes from
-        beyond this limit.
+        The directions form a grid: along each axis, every second direction of the grid of `acceptance_function`. Their
+        sines along each axis do not exceed ±0.5. They contain at least 99 % of the light that the ommatidium accepts,
+        unless more than 1 % comes from beyond this limit.
 
         wavelength: vacuum wavelength [m].
 
@@ -110,10 +111,10 @@ class AppositionEye:
     def contrast(self, cycles_per_degree: float, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
         """Return the contrast of a sine grating in an ommatidium's signal, for a grating of contrast 1.
 
-        It is the modulus of the Fourier transform of the normalised angular sensitivity. The contrast usually falls as
-        the grating becomes finer. It is 0 beyond 2R n/λ cycles per radian, where R is the radius of the pupil and n the
-        index in front of it. The spacing of the ommatidia is a separate limit: their array resolves gratings up to
-        1/(√3 Δφ), with the interommatidial angle Δφ.
+        This contrast is the modulus of the Fourier transform of the angular sensitivity, whose integral is normalised
+        to 1. The contrast usually falls as the grating becomes finer. It is 0 beyond 2R n/λ cycles per radian, where R
+        is the radius of the pupil and n the refractive index in front of the pupil. The spacing of the ommatidia is a
+        separate limit: their array resolves gratings up to 1/(√3 Δφ), with the interommatidial angle Δφ.
 
         azimuth_deg: direction [degrees] along which the grating varies, from x towards y.
 

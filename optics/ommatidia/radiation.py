@@ -5,10 +5,11 @@ this axis and of the distance D from the centre of the waveguide's end:
 
     Ψ(ξ) = z e^{ikD} cos lφ G(sin θ, D),   G = ∫ ψ(x) (1/d - ik)/(2πd²) e^{ik(d - D)} dx,   d = |ξ - x|.
 
-z is the distance of the waveguide's end from the pupil's plane. The end of a waveguide off the pupil's axis is oblique
-to this plane. Ψ then has an error of up to 5e-3 of its largest value. The integral G is computed at Chebyshev points in
-sin θ and 1/D, and interpolated between them by polynomials. For a waveguide on the pupil's axis, D is z/cos θ, so G
-depends on sin θ alone.
+ψ(x) is the mode's field at a position x on the waveguide's end, and ξ a point of the pupil. k is the wavenumber between
+them, and z the distance of the waveguide's end from the pupil's plane. The end of a waveguide off the pupil's axis is
+oblique to this plane. Ψ then has an error of up to 5e-3 of its largest value. The integral G is computed at Chebyshev
+points in sin θ and 1/D, and interpolated between them by polynomials. For a waveguide on the pupil's axis, D is
+z/cos θ, so G depends on sin θ alone.
 """
 
 from __future__ import annotations
@@ -53,8 +54,8 @@ def radiated(
 ) -> np.ndarray:
     """Return the field Ψ of each mode at points of a pupil, (mode, point), up to a constant phase.
 
-    end: position (x, y, z) [m] of the waveguide's end, relative to the pupil's centre. The waveguide's axis joins these
-        two points.
+    end: position (x, y, z) [m] of the waveguide's end, relative to the pupil's centre. The waveguide's axis passes
+        through this position and the pupil's centre.
     k: wavenumber [1/m] behind the pupil.
     """
     sine, phi, distance = _in_guide_frame(x, y, end)
@@ -121,8 +122,8 @@ def _in_guide_frame(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float
     """Return sin θ, φ and D, the spherical coordinates of points of a pupil about the waveguide's end, each (point,).
 
     θ is the angle from the waveguide's axis, φ the azimuth about this axis, and D the distance [m] from the centre of
-    the waveguide's end. The azimuth is counted in the pupil's frame after a rotation along the shortest arc from the
-    pupil's axis to the waveguide's axis.
+    the waveguide's end. The azimuth is counted from the pupil's x axis towards its y axis, after the smallest rotation
+    of these axes that turns the pupil's axis into the waveguide's axis.
 
     x, y: positions [m] of the points on the pupil.
     end: position (x, y, z) [m] of the waveguide's end.
@@ -143,7 +144,11 @@ def _scaled(at: np.ndarray, ends: Ends) -> np.ndarray:
 
 
 def _between(ends: Ends, radians: float, spare: int) -> np.ndarray:
-    """Return Chebyshev points in the range `ends` for a function whose phase changes by `radians` over half of it."""
+    """Return Chebyshev points in the range `ends`, for a function with a varying phase.
+
+    radians: change of the phase over half of the range.
+    spare: number of points that are added to 1.2 per radian.
+    """
     return (ends[0] + ends[1] + (ends[1] - ends[0]) * chebyshev_points(math.ceil(1.2 * radians) + spare)) / 2
 
 

@@ -43,9 +43,9 @@ class Mode:
     def field(self, x: Any, y: Any) -> np.ndarray:
         """Return the amplitude ψ [1/m] at (x, y) [m], with ∫ψ² = 1.
 
-        The amplitude is proportional to J_l(Ur/b) cos lφ in the core and to K_l(Wr/b) cos lφ outside, or sin lφ instead
-        of cos lφ. Here r is the distance from the axis, φ the azimuth, and b the radius of the core. J and K are
-        Bessel's functions, and U and W are the solutions `u` and `w` of the mode equation.
+        The amplitude is proportional to J_l(Ur/b) cos lφ in the core and to K_l(Wr/b) cos lφ outside. If `sine` is
+        True, sin lφ replaces cos lφ in both. Here r is the distance from the axis, φ the azimuth, and b the radius of
+        the core. J and K are Bessel's functions, and U and W are the solutions `u` and `w` of the mode equation.
 
         x, y: positions relative to the waveguide's axis, in arrays whose shapes broadcast.
 
@@ -84,7 +84,10 @@ class Mode:
         return here * here / (below * above)
 
     def _square(self) -> float:
-        """Return the integral of the square of a field whose maximum along the core's edge is 1, in closed form."""
+        """Return the integral of the square of the mode's field, in closed form.
+
+        The field is scaled so that its maximum along the edge of the waveguide's core is 1.
+        """
         azimuth = math.pi * (2 if self.l == 0 else 1)
         outside = self.radius**2 / 2 * (1 / self._kappa() - 1)
         return azimuth * outside / (1 - self.core_share)
@@ -172,7 +175,10 @@ class Waveguide:
         return tuple(sorted(found, key=lambda mode: mode.u))
 
     def _check_taper(self, wavelength: float, axial: list[float], v: float) -> None:
-        """Refuse a taper that is too fast for LP01 at the tip. The roots U of the modes with l = 0 are `axial`."""
+        """Refuse a taper that, at the tip, narrows too fast for light to stay in the mode LP01.
+
+        axial: the solutions U of the mode equation for the modes with l = 0.
+        """
         if self.length is None or self.proximal_diameter is None or not axial:
             return
         first, second = [*axial, v][:2]
@@ -196,10 +202,10 @@ class Waveguide:
     def absorbed(self, mode: Mode) -> float:
         """Return the fraction of a mode's light that the waveguide absorbs; 1 if `length` is None.
 
-        The light of a mode is absorbed along the whole length or, in a taper that becomes too narrow for the mode, only
-        up to the place from which on the mode is not guided. The absorption per length is proportional to
-        `Mode.core_share`, the fraction of the light that travels in the core. In a taper, this fraction changes along
-        the guide. Its mean is computed by quadrature, with an error below 2e-6.
+        The light of a mode is absorbed along the whole length or, in a taper that becomes too narrow to guide the mode,
+        only up to the place where it does so. The absorption per length is proportional to `Mode.core_share`, the
+        fraction of the light that travels in the core. In a taper, this fraction changes along the guide. Its mean is
+        computed by quadrature, with an error below 2e-6.
         """
         if self.length is None:
             return 1.0

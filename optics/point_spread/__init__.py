@@ -4,12 +4,12 @@ psf            psf, plan
 psf_result     PSFResult: a PSF that can be recomputed over other windows
 request        Request: the parameters of one PSF
 light_batch    light through several pupils, for several distances
-coarse_stack   PSFs of several depths and wavelengths from one plan, at coarse tolerances
+coarse_stack   PSFs of several depths and wavelengths, computed together at coarse tolerances
 planner        the cheapest method within the tolerance
-pictures       computation of requested PSFs, which is repeated if a check fails
+pictures       computes the requested PSFs, and computes a PSF again if its check fails
 window_cost    time and memory of a window, and their limits
 spot_check     comparison of a PSF with the direct sum at a few points
-vector_focus   vector_focus: beyond scalar theory
+vector_focus   vector_focus: the focus of polarised light, according to Maxwell's equations
 converging     VectorFocus: a polarised field behind a pupil
 disk_sum       sum of the light on a round receptor
 microvilli     Microvilli: receptors with polarisation sensitivity

@@ -55,16 +55,17 @@ def arriving_light(result: PSFResult, arriving: Any) -> tuple[Array, np.ndarray]
 def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
     """Return the fraction of the pupil's light that is not evanescent, and this fraction's uncertainty, (wavelength,).
 
-    The fraction excludes light that the pupil's mask absorbs.
+    The fraction is relative to all light on the aperture, including the light that the pupil's mask absorbs.
 
     The squared spectrum of a straight edge, integrated over frequencies above f, is 1/(2π²f) per length of the edge.
     For rays along the axis and an aperture of perimeter P and area A, the fraction λP/(2π²A) is therefore evanescent.
     For other rays, this fraction is multiplied by the factor for oblique rays that `_at_edge` returns. It is also
-    multiplied by the mask's transmission along the edge, relative to that of the whole aperture. Light that the relief
-    bends so far that its sine would exceed 1 is evanescent, too.
+    multiplied by the mask's transmission along the edge, relative to that of the whole aperture. Light is evanescent,
+    too, if the relief bends it so far that the sine of its angle to the axis would exceed 1.
 
-    If this estimate is too uncertain, and the pupil is not too wide, the fraction is instead the sum of the power
-    spectrum of the light behind the pupil (`_summed`).
+    These formulas estimate the evanescent light. If the estimate is too uncertain, and the pupil is not too wide, the
+    fraction that is not evanescent is computed as a sum over the power spectrum of the light behind the pupil
+    (`_summed`).
     """
     import drjit as dr
 
@@ -93,7 +94,7 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
 
 
 def _mean(result: PSFResult, values: Sequence[Array]) -> Array:
-    """Return the values of a PSF as one array or, if the PSF is a mean over wavelengths, their weighted mean.
+    """Return `values` as one array or, if the PSF is a mean over wavelengths, their mean with the same weights.
 
     values: one value for each wavelength for which the PSF was computed.
     """
@@ -105,7 +106,7 @@ def _mean(result: PSFResult, values: Sequence[Array]) -> Array:
 
 
 def _mean_number(result: PSFResult, values: Sequence[Any]) -> np.ndarray:
-    """Return the values of a PSF or, if the PSF is a mean over wavelengths, their weighted mean, as a NumPy array.
+    """Return `values` as a NumPy array or, if the PSF is a mean over wavelengths, their mean with the same weights.
 
     values: a number or a tuple of numbers for each wavelength for which the PSF was computed.
     """
@@ -161,12 +162,12 @@ def _bent_beyond_grazing(request: Request) -> tuple[float, float]:
 def _summed(request: Request, unsure: float = 1.0) -> Array | None:
     """Return the fraction of the pupil's light at frequencies below 1/λ; None if the sum would take too long.
 
-    The fraction is computed as a sum that replaces a less certain estimate. It is ∫ |F(u)|² df / A over |f| < 1/λ, with
-    the field u behind the pupil and the area A of its aperture. Lengths are in units of the radius. |F(u)|² has no
-    structure finer than one cycle per diameter. The result is also None for pixelated reliefs and for pupils with more
-    than 100 cycles per radius.
+    The fraction is computed as a sum, which replaces the less certain estimate of `_not_evanescent`. It is
+    ∫ |F(u)|² df / A over |f| < 1/λ, with the field u behind the pupil and the area A of its aperture. Lengths are in
+    units of the radius. |F(u)|² has no structure finer than one cycle per diameter. The result is also None for
+    pixelated reliefs and for pupils with more than 100 cycles per radius.
 
-    unsure: uncertainty of this estimate. The larger it is, the longer the sum may take.
+    unsure: uncertainty of the estimate that the sum replaces. The larger it is, the longer the sum may take.
     """
     beam, asked = request.beam, request.problem
     problem = Problem.from_beam(beam, asked.window, asked.tolerance, asked.dtype, derivatives=False)

@@ -44,8 +44,8 @@ class PSFBatch(OnWindow):
     psf: the same as a NumPy array.
     dx: pitch [m] of the samples.
     plans: one plan per PSF, in the same order, as a flat tuple.
-    members: the light from which each PSF was computed (pupil, source, wavelength and sensor's distance), in the order
-        of `plans`.
+    members: for each PSF, the beam from which it was computed, in the order of `plans`. A beam states the pupil, the
+        source, the wavelength and the sensor's distance.
     setup: window, tolerance, method and dtype, which all PSFs share. The source and the sensor's distance in `setup`
         are those of the first PSF only.
 
@@ -124,9 +124,9 @@ def psf_batch(
 
     At tolerances of 3e-4 or more, with the method "auto", "exact" or "low_rank", the samples for all PSFs are chosen
     together, and PSFs with equal numbers of samples are computed as stacks of matrix products. The error of each PSF is
-    checked. All other PSFs are planned and computed one by one: PSFs of pupils with derivatives or with a
-    `PixelRelief`, and PSFs that would otherwise be inaccurate or take long. The first of them is computed after all of
-    them have been planned.
+    checked. The following PSFs are computed one by one: those at smaller tolerances or with other methods, those of
+    pupils with derivatives or with a `PixelRelief`, and those that would otherwise be inaccurate or take long. For each
+    of these, a method and its samples are chosen. All choices are made before the first of these PSFs is computed.
 
     Raises:
         ValueError: an argument is invalid, or a sequence is empty.

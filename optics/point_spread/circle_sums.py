@@ -7,7 +7,7 @@ distance ρ from the centre, the weight is
 
     w(ρ, R) = 2π R ∫ G(f) J₁(2πRf) J₀(2πρf) df
 
-Weights are even in ρ and in R, and contain no frequencies above the one from which on G is 0. They are therefore
+Weights are even in ρ and in R. They contain no frequencies above a limit, because G is 0 there. They are therefore
 interpolated between evenly spaced distances and radii. Lengths are in units of 1/cutoff, frequencies in units of the
 cutoff.
 """
@@ -39,10 +39,10 @@ class SoftCircles:
     functions.
 
     near: indices of the samples that contribute to at least one circle.
-    samples: interpolation between these samples and evenly spaced distances (sample, distance), sparse.
+    samples: sparse matrix that interpolates from evenly spaced distances to those of these samples (sample, distance).
     to_spectrum: J₀ (distance, frequency).
     from_spectrum: J₁ with the weights of the quadrature (frequency, radius).
-    radii: interpolation between evenly spaced and requested radii (requested, radius), sparse.
+    radii: sparse matrix that interpolates from evenly spaced radii to the requested radii (requested, radius).
     size: number of all samples.
     """
 
@@ -79,7 +79,12 @@ class SoftCircles:
         return cls(near, samples, j0(2 * math.pi * np.multiply.outer(at, f)), back, circles, distance.size)
 
     def evaluate(self, values: np.ndarray) -> np.ndarray:
-        """Return the weighted sums within the circles, (row, radius), over values at the samples, (row, sample)."""
+        """Return the sum Σ_j v_j w(ρ_j, R) over samples for each circle, (row, radius).
+
+        w(ρ_j, R) is the weight of sample j, at the distance ρ_j from the centre, for the circle of radius R.
+
+        values: values v_j at the samples, (row, sample).
+        """
         spectrum = (self.samples.T @ values[:, self.near].T).T @ self.to_spectrum
         return np.asarray((self.radii @ (spectrum @ self.from_spectrum).T).T)
 
@@ -97,7 +102,9 @@ class SoftCircles:
 
 
 def soft_sums(circles: SoftCircles, values: Array) -> Array:
-    """Return `circles.evaluate` as a flat Dr.Jit array (row, radius) with derivatives.
+    """Return the result of `circles.evaluate`, with derivatives, as a flat Dr.Jit array (row, radius).
+
+    It is the weighted sum over samples within each circle.
 
     values: flat Dr.Jit Float64 array (row, sample).
     """
@@ -175,7 +182,7 @@ def _between(places: np.ndarray, step: float) -> tuple[Any, np.ndarray]:
 def _spectrum(kernel: SoftEdge, f: np.ndarray) -> np.ndarray:
     """Return the radial spectrum of the kernel, ∫ ring(r) J₀(2πfr) dr.
 
-    ring(r) is the kernel times 2πr, its weight on a circle of radius r.
+    ring(r) is 2πr times the kernel at the radius r: the integral of the kernel along the circle of this radius.
     """
     from scipy.special import j0
 

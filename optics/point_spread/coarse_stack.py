@@ -1,7 +1,7 @@
-"""PSFs of several depths and wavelengths from one plan, at coarse tolerances.
+"""PSFs of several depths and wavelengths from the same samples of the pupil, at coarse tolerances.
 
-The PSFs that need the most samples are those at the shortest wavelength, for the nearest and the farthest source. Their
-plans determine the samples of all PSFs. The error of each PSF is then checked separately.
+The PSFs that need the most samples are those at the shortest wavelength, for the nearest and the farthest source. The
+samples that suffice for both are used for all PSFs. The error of each PSF is then checked separately.
 """
 
 from __future__ import annotations
@@ -35,9 +35,10 @@ def coarse_stack(
 
     stack: the light, whose numbers may carry derivatives of PyTorch. If these numbers are on a GPU, the GPU computes
         the PSFs and their errors.
-    without: copy of the light for NumPy, without derivatives, from which the processor plans the samples. If `stack` is
-        on a GPU, only two more kinds of data are copied to the processor. These are the errors of the PSFs, and the
-        positions in the window at which a finer sum is computed to find the errors.
+    without: the same light, with numbers of NumPy that carry no derivatives. The processor plans the samples of the
+        pupil from it. If `stack` is on a GPU, only two more kinds of data are copied to the processor. These are the
+        errors of the PSFs, and the positions in the window at which each PSF is compared with a sum over finer samples
+        of the pupil to find its error.
     tolerance, method: see `optics.psf`.
     """
     # Dr.Jit computes the edge of the aperture, so PyTorch cannot compute derivatives with respect to the radius.
@@ -59,7 +60,8 @@ def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method
     """Return samples that are sufficient for all sources and wavelengths of `stack`.
 
     They are planned at the shortest wavelength, for the nearest and for the farthest source. The result is None if, for
-    one of these two sources, another method is chosen or no method meets the tolerance.
+    one of these two sources, no method meets the tolerance, or the method that `optics.psf` would choose does not use
+    samples of this kind (`WindowSampling`).
 
     without: copy of `stack` for NumPy, without derivatives.
     """

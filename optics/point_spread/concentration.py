@@ -108,7 +108,7 @@ def _around(
 
 
 def _kernel(dx: float, cutoff: float, room: float) -> SoftEdge:
-    """Return a kernel whose spectrum passes the intensity's frequencies and blocks their aliases.
+    """Return a kernel whose spectrum is 1 at all frequencies of the PSF and 0 at their aliases.
 
     The kernel smooths the edge of a circle over which samples are summed. Its lengths are in units of 1/cutoff. A wider
     kernel has a spectrum that ends at a lower frequency, so that integrals over the spectrum need fewer nodes.

@@ -29,21 +29,22 @@ ROOM = 0.5  # choice: an enlarged window exceeds the necessary width by √2 to 
 
 
 def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.02) -> MTF:
-    """Return the contrast, |F{PSF}| / (all the light that arrives). F is the Fourier transform.
+    """Return the contrast |F{PSF}| / (all the light that arrives on the sensor's plane), with the Fourier transform F.
 
-    It is 1 at frequency 0. For a `WhitePSF` there is one MTF per receptor type. Source: Goodman, Introduction to
-    Fourier Optics, §6.3.2.
+    The contrast is 1 at frequency 0. For a `WhitePSF` there is one MTF per receptor type. Source: Goodman, Introduction
+    to Fourier Optics, §6.3.2.
 
     arriving: fraction of the pupil's power that arrives on the plane of the sensor, inside or outside the window, a
-        number or (wavelength,), in (0, 1]. None: all transmitted light except the evanescent part, which the pupil's
-        edge and steep slopes of its relief cause.
-    tolerance: largest error of any contrast. Light outside the window causes errors at any frequency. If samples are
-        more than 1/(2 cutoff) apart, frequencies are aliased. If necessary, the PSF is recomputed over a wider or finer
-        window.
+        number or (wavelength,), in (0, 1]. None: all transmitted light, except the part that becomes evanescent at the
+        pupil's edge and at steep slopes of its relief.
+    tolerance: largest error of any contrast. Light outside the window causes errors of contrasts, mainly at frequencies
+        near 0. If samples are more than 1/(2 cutoff) apart, frequencies are aliased. If necessary, the PSF is
+        recomputed over a wider window or on finer samples.
 
     Raises:
         ValueError: arriving has the wrong shape, is outside (0, 1], is given for a `WhitePSF`, or is more than 0.01
-            below the fraction in the window. The tolerance is not positive, or `result` is not a PSF.
+            below the fraction of the pupil's power that arrives within the window. The tolerance is not positive, or
+            `result` is not a PSF.
         AccuracyError: the samples are too coarse or the window is too small for the tolerance, and the PSF cannot be
             recomputed on sufficient samples. The message states a remedy.
     """
@@ -105,8 +106,8 @@ def _wide(result: PSFResult, known: np.ndarray, unsure: np.ndarray, tolerance: f
     unsure: uncertainty of this fraction, (wavelength,).
 
     Raises:
-        AccuracyError: no such window can be computed. If a larger tolerance below 1 can be met with fewer samples, the
-            message states it.
+        AccuracyError: no such window can be computed. If fewer samples would suffice for a larger tolerance
+            below 1, the message states this tolerance.
     """
     seen, coarsest = result, 0.5 / result.highest_cutoff
     for _ in range(GROWTHS):
@@ -172,7 +173,7 @@ def image_quality(
     throughput: T in [0, 1], such as a² for a pupil of the relative radius a. T may carry a derivative. If T is 0, the
         result is 0.
     noise_sigma: σ, in units of the signal, 0 to 1e6.
-    tolerance: largest error of any contrast of the MTF. A known MTF has its own tolerance.
+    tolerance: largest error of any contrast of the MTF. It is ignored if `result` is an MTF.
     with_error: True to return (value, predicted error), each (wavelength,).
 
     Raises:

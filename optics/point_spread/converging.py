@@ -1,4 +1,7 @@
-"""Polarised light behind a pupil, and its field over a window. The field can be recomputed over other windows."""
+"""Polarised light behind a pupil, and the electric field of this light on samples around its image (a window).
+
+The field can be recomputed over other windows.
+"""
 
 from __future__ import annotations
 
@@ -67,8 +70,8 @@ class Converging(ReadOnlyArrays):
     def cutoff(self) -> float:
         """Highest frequency [1/m] of the intensity.
 
-        It results from interference between light from opposite sides of the pupil's rim. The directions of these two
-        rays differ most on the axis.
+        It results from interference between two rays from opposite sides of the pupil's rim. The directions of these
+        rays differ most if they meet on the axis.
         """
         radius, z = self.beam.pupil.radius, number(self.beam.distance)
         sine = radius / z if self.aplanatic else radius / math.hypot(radius, z)
@@ -118,12 +121,13 @@ class Converging(ReadOnlyArrays):
         return found, Plan(PLANE_WAVES, (nodes, 1), "float64", error, "confirmed by a check against the direct sum")
 
     def _crossed(self, scalar: np.ndarray, window: Grid) -> float:
-        """Return the error of what light polarised along y adds to Ex, and light polarised along x to Ey.
+        """Return the error of two contributions: from light polarised along y to Ex, and from light along x to Ey.
 
-        A check with light of a single plane of polarisation does not detect this error. It results from the
-        approximation that the path has the same curvature for the whole pupil. Only light whose polarisation rotates
-        with its ray contributes in this way. The fraction of this light is estimated as sin²θ / 2, with the angle θ
-        between the axis and the steepest ray.
+        A check with light of a single plane of polarisation does not detect this error. It results from an
+        approximation: the second derivatives of the path from a point of the pupil to a point of the window are taken
+        to be the same for all points of the pupil. A bent ray's electric field is rotated with the ray. Only light
+        whose field is thereby rotated from x to y, or from y to x, contributes. The fraction of this light is estimated
+        as sin²θ / 2, with the angle θ between the axis and the steepest ray.
 
         scalar: scalar field over the window, (y, x).
         """
@@ -150,7 +154,7 @@ class Converging(ReadOnlyArrays):
         raise AccuracyError(f"tolerance = {self.tolerance:g}: a check finds an error of {error} in Ex")
 
     def _smythe(self, window: Grid, tolerance: float) -> tuple[np.ndarray, Plan]:
-        """Return the field from Smythe's integral, with samples for which the scalar field meets the tolerance."""
+        """Return the field from Smythe's integral, on samples of the pupil that meet the tolerance for scalar light."""
         made = self._scalar(window, "float32" if tolerance >= SINGLE else "float64", tolerance)
         sampling, root = cast(WithField, made.sampling), math.sqrt(self.beam.pupil.area)
 
@@ -165,9 +169,10 @@ class Converging(ReadOnlyArrays):
         return found, replace(made.plan, predicted_error=error, why=why, seconds=seconds, scalar_error=0.0)
 
     def _scalar(self, window: Grid, dtype: str, tolerance: float) -> PSFPicture:
-        """Return the scalar field over the window, with its plan and its samples of the pupil.
+        """Return the scalar field over the window, the plan of its computation, and the samples of the pupil used.
 
-        The field is checked against the direct sum. It is computed in float64 if float32 is not sufficient.
+        The field is checked at some points against a more accurate sum over the pupil. It is computed in float64 if
+        float32 is not sufficient.
         """
         beam = self._behind(SCALAR)
         problem = Problem.from_beam(beam, window, tolerance, dtype)
@@ -182,9 +187,10 @@ class Converging(ReadOnlyArrays):
         return replace(self.beam, pupil=RayField(self.beam, 0, weights).pupil)
 
     def _errors(self, problem: Problem, fields: dict[Weights, np.ndarray]) -> float | None:
-        """Return the largest relative error of several fields, by comparison with the direct sum.
+        """Return the largest relative error of several fields.
 
-        The result is None if the comparison would take too long.
+        The fields are compared at some points with the direct sum over the pupil. The result is None if the comparison
+        would take too long.
 
         fields: the fields to be checked, (y, x). The key of a field contains weights that define a mask of the pupil,
             see `RayField`. The field is compared with the direct sum for light through the pupil with this mask.

@@ -41,18 +41,19 @@ class DiskSum:
 
     @classmethod
     def over(cls, light: VectorFocus, radius: float, centre: tuple[float, float] | None = None) -> DiskSum:
-        """Return the sum over a disk in the light's window.
+        """Return the light and the weights of its samples whose weighted sum is the integral over a disk.
 
-        The disk is convolved with a kernel whose spectrum is 1 at all frequencies of the intensity and 0 at frequencies
-        that alias onto them: see `optics.encircled_energy`. If samples are too coarse, or too few around the disk, the
-        light is recomputed on other samples.
+        The weights are the disk, convolved with a kernel. The kernel's spectrum is 1 at all frequencies that the
+        intensity contains, and 0 at the frequencies that samples cannot distinguish from these (aliases), see
+        `optics.encircled_energy`. If samples are too coarse, or too few around the disk, the light is recomputed on
+        other samples.
 
-        centre: centre (x, y) [m] of the disk; None for sample n//2.
+        centre: centre (x, y) [m] of the disk, within the window of the light. None: `light.centre`.
 
         Raises:
             ValueError: the disk extends beyond the window.
-            AccuracyError: suitable samples cannot be computed, or `light` is not from `vector_focus`. If too many are
-                needed, the message states a sufficient pitch and shape.
+            AccuracyError: suitable samples cannot be computed, or `light` is not from `vector_focus`. If too many
+                samples are needed, the message states the pitch and the number of samples that would suffice.
         """
         positive("radius", without_derivative("radius", radius))
         middle = light.centre if centre is None else point_2d("centre", centre)
@@ -83,7 +84,7 @@ class DiskSum:
 
     @property
     def light_error(self) -> float:
-        """Upper bound on the error that the light's own error causes in an integral over the disk.
+        """Upper bound on the error of an integral over the disk that results from the light's predicted error.
 
         The bound follows from the Cauchy-Schwarz inequality.
         """

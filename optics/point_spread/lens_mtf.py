@@ -52,11 +52,11 @@ class LensMTF(ReadOnlyArrays):
     def plot(self, axes: Any, frequency: float | None = None) -> None:
         """Draw the contrasts on Matplotlib axes, with solid tangential and dashed sagittal lines.
 
-        With several shifts, the lines show contrast against shift at one frequency. With one shift, they show contrast
-        against frequency.
+        With several positions of the image plane (`shifts`), the lines show contrast as a function of position, at one
+        frequency. With one position, they show contrast as a function of frequency.
 
-        frequency: frequency [1/m] of the lines if there are several shifts; the nearest one of `frequencies` is drawn.
-            None: the middle one.
+        frequency: frequency [1/m] of the lines if there are several positions. The nearest one of `frequencies` is
+            drawn. None: the middle one.
         """
         through = len(self.shifts) > 1
         middle = self.frequencies[len(self.frequencies) // 2]
@@ -76,15 +76,15 @@ class LensMTF(ReadOnlyArrays):
 def lens_mtf(
     lens: ExitPupils, frequencies: Any, shifts: Any = 0.0, weights: Any = None, tolerance: float = 0.02
 ) -> LensMTF:
-    """Return the contrasts of a lens in light of all wavelengths of `lens`, with lateral colour, through focus.
+    """Return the contrasts of a lens in light of all its wavelengths together, for positions of the image plane.
 
-    The optical transfer function is the mean Σ w(λ) OTF(λ) over the wavelengths λ, with `weights` w, and with all PSFs
-    relative to one point of the image plane. At frequency 0, the result is the fraction of the light within the windows
-    of the PSFs, slightly below 1.
+    The optical transfer function is the mean Σ w(λ) OTF(λ) over the wavelengths λ, with `weights` w. All PSFs are
+    relative to one point of the image plane, so the result includes lateral colour. At frequency 0, the result is the
+    fraction of the light within the windows of the PSFs, slightly below 1.
 
     lens: from `read_exit_pupils`.
     frequencies: spatial frequencies [1/m] on the image plane, a number or (frequency,).
-    shifts: distances [m] by which the image plane is moved along the light, a number or (shift,).
+    shifts: distances [m] by which the image plane is moved in the direction of the light, a number or (shift,).
     weights: relative weight of each wavelength, (wavelength,). They are divided by their sum. None: equal weights.
     tolerance: largest error of any contrast, see `optics.mtf`.
 

@@ -91,7 +91,7 @@ class LightBatch:
         view: Mapping[str, Any],
         convert: Callable[[np.ndarray], Array],
     ) -> dict[int, Array]:
-        """Return those PSFs that meet the tolerance if several sources' PSFs are computed together.
+        """Compute the PSFs of several sources together, and return those PSFs that meet the tolerance.
 
         The result maps the index of a PSF in `members` to the PSF at all wavelengths, (wavelength, y, x). PSFs of
         several sources that have the same pupil and the same distance of the sensor form a stack. The samples of the

@@ -62,7 +62,7 @@ class Microvilli:
         the light is recomputed.
 
         radius: radius [m] of the receptor.
-        centre: centre (x, y) [m] of the receptor; None for sample n//2.
+        centre: centre (x, y) [m] of the receptor. None: `light.centre`.
         with_error: True to return (value, predicted error). The predicted error includes the errors of the sum over
             samples and of `vector_focus`.
 
@@ -80,7 +80,7 @@ class Microvilli:
     def polarization_sensitivity(
         self, light: VectorFocus, radius: float, centre: tuple[float, float] | None = None
     ) -> float:
-        """Return the polarisation sensitivity: the largest divided by the smallest signal of linearly polarised light.
+        """Return the polarisation sensitivity: the largest signal for linearly polarised light divided by the smallest.
 
         All planes of polarisation in front of the pupil are considered. The result equals the dichroic ratio if rays
         are nearly parallel to the axis, and is smaller if rays are steep. For the arguments, see `signal`.

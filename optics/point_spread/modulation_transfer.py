@@ -45,7 +45,8 @@ class MTF(ReadOnlyArrays):
     tensor: contrast as a Dr.Jit tensor (wavelength, fy, fx), which is 1 at zero frequency. `mtf` is the same as a NumPy
         array.
     fx, fy: frequencies of the grid [cycles per metre on the sensor]. Their pitch is 1 / (longest side of the window).
-    cutoff: highest frequency [1/m] that a pupil of this size transmits, 2 sin θ / λ, (wavelength,).
+    cutoff: highest frequency [1/m] that the pupil transmits, 2 sin θ / λ, (wavelength,). λ is the wavelength behind the
+        pupil, and θ the angle between the axis and the ray from the pupil's rim to the sensor's centre.
     predicted_error: largest predicted error of a contrast, at the grid's frequencies and between them, (wavelength,).
         Only contrasts at frequencies near 0 have errors of this size, see `errors`.
     shares: fraction of all arriving light in each sample of the PSF, as a Dr.Jit tensor (wavelength, y, x).
@@ -176,8 +177,9 @@ class MTF(ReadOnlyArrays):
     def profile(self, frequencies: np.ndarray, with_error: bool = False) -> Any:
         """Return the mean contrast over all orientations at radial `frequencies` [1/m], (wavelength, frequency).
 
-        The frequencies need not lie on the grid. Arrays are flattened. At frequency 0 the contrast is 1. Contrasts
-        count as 0 if |fx| or |fy| is beyond the Nyquist frequency of the PSF's samples (half a cycle per sample).
+        The frequencies need not lie on the grid. If `frequencies` has several axes, it is flattened. At frequency 0 the
+        contrast is 1. Contrasts count as 0 if |fx| or |fy| is beyond the Nyquist frequency of the PSF's samples (half a
+        cycle per sample).
 
         with_error: whether to return (value, predicted error), each (wavelength, frequency).
 
@@ -220,7 +222,8 @@ class MTF(ReadOnlyArrays):
         """Return the mean of `errors` over the orientations at radial frequencies f, (wavelength, frequency).
 
         Means over rings of frequencies are interpolated. The width of a ring is the step between frequencies of the
-        MTF. Below the first step, the mean is at least `predicted_error`, except at frequency 0, where it is 0.
+        MTF. Below the smallest positive frequency of the MTF, the result is at least `predicted_error`, except at
+        frequency 0, where the result is 0.
         """
         step, side = float(self.fx[1] - self.fx[0]), self.fx.size
         ring = np.rint(np.hypot.outer(self.fy, self.fx) / step).astype(np.intp).ravel()
@@ -262,7 +265,10 @@ class MTF(ReadOnlyArrays):
 
 
 def _transforms(shares: Array, dx: float) -> Iterator[Field]:
-    """Yield the Fourier transform of the samples at each wavelength, a field (fy, fx); the origin is sample n//2."""
+    """Yield the Fourier transform of the PSF's samples at each wavelength, a field (fy, fx).
+
+    Phases refer to the sample with the index n//2 along each axis, where n is the number of samples.
+    """
     import drjit as dr
 
     types, (waves, height, width) = precision("float64"), shares.shape

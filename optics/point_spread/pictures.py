@@ -39,7 +39,7 @@ LAST_TOLERANCE = 1e-2  # choice: additional factor on the tolerance of the last 
 class PSFPicture(NamedTuple):
     """A computed PSF, as a flat array, and its plan.
 
-    field: complex amplitude, including the carrier, if it was requested; else None.
+    field: complex amplitude, including the carrier wave exp(ikz), if it was requested; else None.
     sampling, problem: samples and problem from which the PSF was computed.
     """
 
@@ -68,7 +68,7 @@ class _Attempt:
     def at(cls, request: Request, planned: tuple[Plan, Sampling]) -> _Attempt:
         """Return the PSF, computed by the planned method.
 
-        A method that "auto" chose may not provide required derivatives on the selected device. An exact method is then
+        If "auto" chose a method that cannot provide the required derivatives on the selected device, an exact method is
         used instead.
 
         If Dr.Jit computes the PSF, it only records the computation here, and executes it when the PSF is first read.
@@ -103,7 +103,7 @@ class _Attempt:
         return self.sampling.model_error > 0
 
     def stated(self, error: float) -> PSFPicture:
-        """Return the PSF, and its plan with this error as the predicted error."""
+        """Return the PSF together with its plan, whose predicted error is replaced by `error`."""
         plan, types = replace(self.plan, predicted_error=error), precision(self.request.problem.dtype)
         plain = isinstance(self.image, np.ndarray)
         image = types.Float(padded_for_packets(self.image)) if plain else self.image
@@ -111,15 +111,16 @@ class _Attempt:
 
     @property
     def for_window(self) -> bool:
-        """True if the samples of the pupil resolve only the light that arrives in the window."""
+        """True if the samples of the pupil are too coarse for light that arrives outside the PSF's window."""
         return isinstance(self.sampling, WindowSampling)
 
     def repeated(self, error: float, tolerance: float, last: bool) -> _Attempt | None:
-        """Return the next attempt, after the comparison with the direct sum has found an error above the tolerance.
+        """Return the next attempt, after a check at some points has found an error above the tolerance.
 
         If the method was an approximation, the next attempt uses an exact method. If the method was exact, the next
-        attempt has a smaller tolerance, because the same error of the field is a larger relative error in a dark
-        window. The result is None if the dtype is not precise enough for this tolerance.
+        attempt has a smaller tolerance. In a window with little light, an error of the field is larger relative to the
+        field, so a smaller error of the field is needed. The result is None if the dtype is not precise enough for this
+        tolerance.
 
         Some methods use samples of the pupil that resolve only the light which arrives in the window. Such samples do
         not support very small tolerances. If such a tolerance would be necessary, the next attempt resolves all light
@@ -155,7 +156,7 @@ def _area(beam: Beam, problem: Problem) -> Array:
 
 
 def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPicture]:
-    """Return PSFs as flat arrays, with their plans.
+    """Return PSFs as flat arrays, each with its plan, which states the method and the predicted error.
 
     All PSFs are planned before the first is computed, so an impossible request raises its error at once. All
     computations are started before the first result is awaited.
@@ -184,10 +185,11 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
 
 
 def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
-    """Return the PSF and its plan, after a comparison with the direct sum has determined its error.
+    """Return the PSF and its plan, after the PSF's error has been determined.
 
-    If the error exceeds the tolerance, the PSF is computed again, more accurately. The plan contains the error of the
-    returned PSF. If the comparison would take too long, the plan contains a predicted error instead.
+    The PSF is compared at some points with a more accurate sum over the pupil. If the error exceeds the tolerance, the
+    PSF is computed again, more accurately. The plan contains the error of the returned PSF. If the comparison is
+    impossible or would take too long, the plan contains a predicted error instead.
 
     asked: the user's request. If it names an approximate method, the result is accepted regardless of its error.
     tries: number of remaining attempts, including this one.
@@ -224,7 +226,7 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
 
 
 def _predicted_error(image: np.ndarray, sampling: Sampling, problem: Problem) -> float:
-    """Return the error of a PSF that is not compared with the direct sum, estimated from its brightness.
+    """Return the error of a PSF, estimated from the PSF's brightness and not by comparison with another method.
 
     Sampling causes an error of up to half the tolerance. Rounding adds an error δU to the field U, which is as large in
     a dark window as in a bright one. Assume that the method spreads this error evenly over a square of width W

@@ -129,10 +129,11 @@ OTHERS, OTHERS_IF_DIVIDED = 4e-3, 15e-3  # choices: time [s] of planning other m
 def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SECONDS) -> tuple[Plan, Sampling]:
     """Return the plan and the fastest sampling that meets the problem's tolerance. Plans are cached.
 
-    method: "auto" compares all methods that may save time (only exact methods if the PSF carries derivatives), "exact"
-        only exact methods, and "field" only exact methods with a complex field. A method's name selects that method
-        alone. If it is an approximation, only the error due to its samples must be within the tolerance. The error of
-        the approximation itself may be larger.
+    method: "auto" compares all methods (only exact methods if the PSF carries derivatives). "exact" compares only exact
+        methods, and "field" only the exact methods that compute a complex field. Methods that cannot be faster than
+        the best one so far are skipped. A method's name selects that method alone. If the named method is an
+        approximation, only the error due to its samples must be within the tolerance. The error of the approximation
+        itself may be larger.
 
     Raises:
         ValueError: the method is unknown.
@@ -189,7 +190,7 @@ def _sampling_error(problem: Problem) -> float:
 
 
 def _seconds(option: Sampling, problem: Problem) -> float:
-    """Return the time [s] of a whole PSF: to plan it, compute it by a method, copy it and check some of its points."""
+    """Return the time [s] that a PSF takes in all: for planning, computation, copying and a check of some points."""
     call = PSF_CALL["window" if isinstance(option, WindowSampling) else "other"]
     return call + option.seconds + window_seconds(problem) + check_seconds(problem, option)
 

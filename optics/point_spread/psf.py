@@ -90,7 +90,8 @@ def plan(
 ) -> Plan:
     """Return the plan of `psf` at one wavelength without computing the PSF. Arguments and errors: see `psf`.
 
-    `psf` compares its result with the direct sum. The plan of the result can therefore state another error or method.
+    `psf` also checks its result at some points against a more accurate sum. `PSFResult.plan` therefore states the error
+    that the check found. It names another method if the method that was planned failed the check.
     """
     source = PointSource(source_distance, source_angle)
     at = sensor_place(of_kind("pupil", pupil, Pupil, "Pupil(25e-6)"), sensor_distance, source.distance)

@@ -43,14 +43,14 @@ OF_CELLS = ("pinhole", "geometric", "perfect_lens")  # methods whose samples are
 
 @dataclass(frozen=True, eq=False)
 class PSFResult(ReadOnlyArrays, OnWindow):
-    """A PSF on samples of the sensor, dx [m] apart. Sample n//2 is at `centre` (x, y) [m]; y increases with the row.
+    """A PSF on samples dx [m] apart. Sample [rows//2, columns//2] is at `centre` (x, y) [m]; y increases with the row.
 
     tensor: the PSF as a Dr.Jit tensor (wavelength, y, x) that carries the derivatives of the parameters.
     psf: the same as a NumPy array [1/m²]. Its integral over an unbounded plane is the fraction of the pupil's power
         that arrives there; evanescent light, for example, does not. The PSF is never renormalised.
     plans: one plan per wavelength; `plan` is the least accurate one.
     requests: parameters with which functions such as `optics.strehl_ratio` recompute the PSF on other samples, one
-        entry per wavelength. A mean over wavelengths (see `mean`) keeps those of all wavelengths. Empty if unknown.
+        entry per wavelength, also in a mean over wavelengths (see `mean`). Empty if these parameters are unknown.
     shares: weight of each request in a mean over wavelengths, (request,). None if the PSF is no such mean.
     field_parts: real and imaginary part of the complex amplitude, as Dr.Jit tensors (wavelength, y, x) with
         derivatives; None for means, and unless `psf` was called with field=True. The amplitude [1/m] has the carrier
@@ -79,7 +79,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         return read_only(re + 1j * im)
 
     def __repr__(self) -> str:
-        """Return a short description that omits the requests, because these contain grids of slopes."""
+        """Return a short description. It omits `requests`, which contain large arrays."""
         count, height, width = self.tensor.shape
         planes = f"{count} wavelength{'s' * (count > 1)}, {height} x {width} samples {self.dx:.3g} m apart"
         return f"<PSFResult {planes}, predicted error {self.plan.predicted_error:.1e}>"
@@ -98,9 +98,9 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def power(self) -> np.ndarray | Array:
-        """Fraction of the pupil's power inside the window, up to dx/2 beyond the outermost samples, (wavelength,).
+        """Fraction of the pupil's power inside the window, which ends dx/2 beyond its outermost samples, (wavelength,).
 
-        It is a sum over the samples. If they are too far apart for this sum, the PSF is recomputed on finer ones.
+        It is a sum over samples. If these are too far apart for the sum, the PSF is recomputed at a smaller pitch.
 
         Raises:
             AccuracyError: samples are too coarse and cannot be recomputed. The message states sufficient samples.
@@ -109,7 +109,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def power_error(self) -> np.ndarray:
-        """Predicted error of `power`, (wavelength,). It raises the same exceptions as `power`.
+        """Predicted error of `power`, (wavelength,). Exceptions are those of `power`.
 
         It includes the error of the PSF. If samples are values at points, it also includes half of the power of the
         outermost samples, because the sum of such samples does not define exactly where the window ends.
@@ -135,7 +135,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def window_sums(self) -> np.ndarray | Array:
-        """Sum of the PSF's samples times dx², (wavelength,). Unlike in `power`, dx may be too coarse for sums."""
+        """Sum of the PSF's samples times dx², (wavelength,). It differs from `power` if dx is too coarse."""
         import drjit as dr
 
         waves, flat = self.tensor.shape[0], self.psf.reshape(len(self.psf), -1)
@@ -166,7 +166,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def highest_cutoff(self) -> float:
-        """Highest frequency [1/m] of the intensity. In a mean over wavelengths, that of the shortest, if known."""
+        """Highest frequency [1/m] of the intensity at the shortest wavelength; at the mean if others are unknown."""
         if self.shares is None or not self.can_recompute:
             return float(self.cutoff.max())
         shortest = min(request.beam.wavelength for request in self.requests)
@@ -237,7 +237,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @cached_property
     def of_all_light(self) -> PSFResult:
-        """This PSF, if possible from samples of the pupil that resolve all light, and not only the light in the window.
+        """This PSF. If its samples of the pupil are too coarse for light outside the window, it is recomputed.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -245,10 +245,10 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         return self.recompute_on(self.window, "a sum") if self.for_window and self.can_recompute else self
 
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
-        """Return a PSF whose samples are at most `coarsest` [m] apart, or are means over squares of side dx.
+        """Return a PSF whose samples are at most `coarsest` [m] apart, for sums over these samples.
 
-        Suitable samples stay in place; `of_all_light` may recompute their values. Otherwise the square around each
-        sample is divided into smaller ones, and the PSF is recomputed at their centres.
+        If samples are close enough, or are means over squares, the result is `of_all_light`. Otherwise the square
+        around each sample is divided into smaller squares, and the PSF is recomputed at their centres.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -280,10 +280,10 @@ def _through(request: Request, window: Grid) -> Request:
 def spread(requests: Sequence[Request]) -> PSFResult:
     """Return PSFs of one pupil at several wavelengths over one window.
 
-    With MANY or more wavelengths, the method of one wavelength may be reused for the next, see `Request.after`.
+    With 8 or more wavelengths, the method chosen for one is tried first for the next, see `Request.after`.
 
     Raises:
-        AccuracyError: no method meets the tolerance, or rounding errors exceed the tolerance in a dark window.
+        AccuracyError: no method meets the tolerance, or the window is so dark that rounding errors exceed it.
     """
     import drjit as dr
 

@@ -44,10 +44,10 @@ class Request:
     like: Plan | None = None
 
     def after(self, other: Request, plan: Plan) -> Request:
-        """Return this request with another request's plan as `like`, the plan whose method is tried first.
+        """Return this request, changed so that the method of `plan`, the plan of the `other` request, is tried first.
 
-        The request is returned unchanged if the two requests differ in more than wavelength and window, if `method` is
-        not "auto", or if the plan's method is an approximation.
+        This request is returned unchanged in three cases. The requests differ in pupil, source, distance of the sensor
+        or `keeps_field`. The `method` of one of them is not "auto". The method of `plan` is approximate.
 
         A method that is suitable for one wavelength is usually suitable for the next. Trying it first saves the
         comparison of methods, which takes as long as a small PSF.
@@ -158,7 +158,7 @@ class Setup:
         check_window(self.window, self.dtype)
 
     def request(self, pupil: Pupil, wavelength: float) -> Request:
-        """Return the request for a pupil at a vacuum wavelength [m].
+        """Return the request for the PSF of a pupil at a vacuum wavelength [m].
 
         Raises:
             ValueError: an argument is invalid; the message names it with its value and valid range.

@@ -33,16 +33,16 @@ DIGITS_STEP = 0.25  # choice: digits of a rule are rounded to multiples of this,
 
 @dataclass(frozen=True)
 class Effort:
-    """Limits (choices) on the effort of a spot check, which compares a PSF with the direct sum at a few points.
+    """Limits on the effort of a spot check, which compares a PSF with the direct sum over the pupil at a few points.
 
     points: largest number of points at which a PSF is checked.
     points_along_radius: the largest number of points for a rotationally symmetric PSF in a window around the axis.
-    fewest: number of points below which the estimate is useless.
-    spare_digits: numbers of digits by which the direct sum is more accurate than the tolerance, tried in this order.
-        The first number with which all points can be checked in time is used, or else the last number.
+    fewest: number of points below which the error of the PSF cannot be estimated.
+    spare_digits: numbers of digits by which the direct sum is more accurate than the tolerance. The first number with
+        which all points can be checked in time is used. If there is none, the last number is used.
     share: time limit of the check, relative to the time of the PSF.
-    share_of_few: the same for windows with fewer than `few` samples, since `share` leaves no time for `fewest` points.
-        Without a check, the error of the PSF may be as large as its predicted upper bound.
+    share_of_few: time limit for windows with fewer than `few` samples, for which `share` would be too short. Without a
+        check, the error of the PSF may be as large as its predicted upper bound.
     seconds: time [s] that a check may take even if the shares permit less.
     """
 
@@ -72,11 +72,10 @@ class _DirectSum:
 
 
 def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) -> float | None:
-    """Return the relative L2 error of the intensity over the window, estimated from the direct sum.
+    """Return the relative L2 error of a PSF over its window, from a comparison with the direct sum over the pupil.
 
-    The points are selected according to the probabilities from `_chances`. The result is None if the PSF may be wrong
+    The points to compare are drawn with the probabilities from `_chances`. The result is None if the PSF may be wrong
     beyond some distance from the axis (`Problem.reach`), if the window is dark, or if the check would take too long.
-
     With n points of probability p_k, the sum of squared errors Σ (δI)² is estimated by Σ (δI_k)² / (n p_k).
 
     image: the PSF |U|² / (pupil area), a flat array.
@@ -105,10 +104,10 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
 
 
 def _own_error(problem: Problem, reference: _DirectSum, darkness: float) -> float:
-    """Return the relative error of an intensity computed by the direct sum.
+    """Return the relative error of an intensity computed by the direct sum, due to quadrature and rounding of paths.
 
-    It has two causes: the rounding of paths, and the quadrature. The quadrature changes the amplitude by 10^-digits
-    times the amplitude of light that all arrives in phase. The intensity has twice the relative error of the amplitude.
+    Quadrature changes the amplitude by 10^-digits times the amplitude that all light in phase would have, and the
+    intensity by twice the relative change of the amplitude.
     """
     return 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
 
@@ -116,18 +115,17 @@ def _own_error(problem: Problem, reference: _DirectSum, darkness: float) -> floa
 def path_rounding(problem: Problem, darkness: float) -> float:
     """Return the relative error of the intensity due to the rounding of optical paths in float64.
 
-    A phase error of δ [rad] changes the amplitude by δ times the amplitude of light that all arrives in phase. A spot
-    check does not show this error, because the direct sum uses similar paths.
+    A phase error of δ [rad] changes the amplitude by δ times the amplitude that all light in phase would have. A
+    comparison of two methods does not show this error if both round the paths in a similar way.
     """
     return WAVE_ROUNDING * problem.waves * 10.0**darkness
 
 
 def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
-    """Return by how many digits the window's amplitude is below the amplitude that all light in phase would have.
+    """Return log10(U / amplitude in the window), at least 0. U is the amplitude that all light in phase would have.
 
     If the light of the whole aperture (area A) arrived in phase, its amplitude would be U = A/(λz), and the PSF U²/A =
-    A/(λz)². The error of the direct sum is proportional to this U. The digits are those of the amplitude, half of those
-    of the PSF.
+    A/(λz)². The error of the direct sum over the pupil is proportional to U.
 
     mean: root mean square of the PSF over the window.
     """
@@ -136,7 +134,10 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
 
 
 def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -> _DirectSum:
-    """Return the most accurate direct sum with time for all points, else the least accurate one, for fewer points."""
+    """Return the most accurate direct sum that can be computed in time at all points.
+
+    If there is none, return the least accurate direct sum, at as many points as the time permits.
+    """
     samples, fine = math.prod(problem.window.shape), _finer_detail(beam, problem)
     share = EFFORT.share if samples >= EFFORT.few else EFFORT.share_of_few
     pairs = max(share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND["float32"]
@@ -154,19 +155,19 @@ def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -
 
 
 def _finer_detail(beam: Beam, problem: Problem) -> float:
-    """Return how many more cycles per pupil radius the direct sum of a spot check resolves than the PSF does.
+    """Return the resolution of a spot check's direct sum minus that of the PSF, in cycles per pupil radius.
 
     A PSF neglects detail of reliefs, wavefronts and masks that changes phases [rad] by less than a tenth of the PSF's
-    tolerance. The direct sum resolves finer detail. Otherwise the comparison would not show the resulting error.
+    tolerance. The direct sum resolves finer detail, so that its comparison with the PSF shows the resulting error.
     """
     fine = beam.pupil.bandwidth(beam.wavelength, FINER_DETAIL * problem.tolerance / 10)
     return problem.radius * max(fine - problem.detail, 0.0)
 
 
 def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the flat indices of the points to compare, and the probability with which each was drawn.
+    """Return flat indices of the points at which a PSF is checked, and the probability with which each was drawn.
 
-    The points are drawn at equal steps of the cumulative probability, so that no likely point is omitted.
+    A point is drawn each time the sum of the probabilities grows by 1/`points`. No more probable point is missed.
     """
     # If there are few points, each is compared once.
     even = np.full(points, 1 / points)
@@ -180,10 +181,10 @@ def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray
 def exact_psf(
     beam: Beam, problem: Problem, x: np.ndarray, y: np.ndarray, bright: float, seconds: float
 ) -> tuple[np.ndarray, float] | None:
-    """Return the PSF at points (x, y) [m] by the direct sum, and its relative error where it is `bright` [1/m²].
+    """Return the PSF at (x, y) [m] by direct sums over the pupil, and their relative error for the PSF `bright` [1/m²].
 
     The result is None if PSFs of this problem may be wrong beyond some distance from the axis (`Problem.reach`), or if
-    the sum takes too long. Its time limit is that of `spot_check` for a PSF that takes `seconds`.
+    the sum takes too long. Its time limit is that of a `spot_check` with the same `seconds`.
     """
     darkness = _darkness(beam, problem, bright)
     reference = _affordable(beam, problem, darkness, seconds)
@@ -222,7 +223,7 @@ def _chances(bright: np.ndarray, window: Grid) -> np.ndarray:
     It is the mean of six distributions. The first is uniform. The others are proportional to the following quantities:
 
     - Intensity: if the amplitude has the same error everywhere, the squared error of the intensity is proportional to
-        the intensity. Next to a bright focus, only this distribution detects such an error.
+        the intensity. Next to a bright focus, the other distributions do not detect this error.
     - Squared intensity, spread over neighbouring samples: if a focus lights one sample, errors lie in its neighbours.
     - Nearness to a side, and nearness to a corner: phases change fastest there, so quadratures fail first at the few
         outermost samples. In a window off the axis, phases change fastest at the sides that are farthest from the axis.
@@ -271,11 +272,10 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return two flat arrays, with one number per sample of a window, from which `_chances` adds up probabilities.
+    """Return two flat arrays, with one number per sample of a window, from which `_chances` computes probabilities.
 
     The arrays do not depend on the PSF. The first is the sum of two probability distributions. One of them prefers
-    samples near a side of the window, the other samples near a corner. The second array is the first plus the uniform
-    distribution.
+    samples near a side of the window, the other samples near a corner. The second adds the uniform distribution.
 
     centre: position (x, y) of the window's centre, in samples.
     """

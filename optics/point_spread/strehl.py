@@ -49,16 +49,16 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
     factor of the integrand. For a circle without a mask, the modulus of U is |1 - z/L - ikz ln(L/z)|, with L at the
     rim. The maximum is searched near the brightest samples. If the samples are too coarse, finer samples are computed
     there. The maximum of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the maxima without
-    aberration, with the same weights. If `result.can_recompute` is False, it is divided by the maximum without
-    aberration at the mean wavelength.
+    aberration, with the same weights. If `result.can_recompute` is False, the maximum of the mean is divided by the
+    maximum without aberration at the mean wavelength.
 
     with_error: True to return (value, predicted error), each (wavelength,).
 
     Raises:
         ValueError: `result` is not a PSF, or with_error is not a bool.
-        AccuracyError: the maximum lies outside the window, or the PSF exceeds it at a point outside the window that
-            rays reach. The same error results if the samples are too coarse and finer ones cannot be computed (the
-            message states which samples are sufficient), or if no peak is found.
+        AccuracyError: the maximum lies outside the window, or rays land at a place outside the window where the PSF
+            exceeds its maximum in the window. The same error results if the samples are too coarse and finer ones
+            cannot be computed (the message states which samples are sufficient), or if no peak is found.
     """
     import drjit as dr
 
@@ -143,11 +143,12 @@ def _peak(result: PSFResult) -> Peak:
 def _brightest(result: PSFResult) -> tuple[float, float]:
     """Return the point (x, y) at which the spline through the samples is brightest.
 
-    The brightest sample need not belong to the highest lobe. Let p be the maximum of a non-negative function without
-    frequencies beyond the cutoff f. At a distance d < 1/(2f) from the maximum, the function is at least p cos²(πfd) (M.
-    Riesz 1914). The sample nearest the maximum is at most half the diagonal between samples away from it. With this
-    distance as d, the sample has at least the value p cos²(πfd). The surroundings of all samples above this value are
-    searched. If there are more than MOST_SPLINED such samples, only the brightest MOST_SPLINED ones are used.
+    Samples can miss the peak of a lobe, so the brightest sample need not lie in the highest lobe of the PSF. Let p be
+    the maximum of a non-negative function without frequencies beyond the cutoff f. At a distance d < 1/(2f) from the
+    maximum, the function is at least p cos²(πfd) (M. Riesz 1914). The sample nearest the maximum is at most half the
+    diagonal between samples away from it. With this distance as d, the sample has at least the value p cos²(πfd). The
+    surroundings of all samples above this value are searched. If there are more than MOST_SPLINED such samples, only
+    the brightest MOST_SPLINED ones are used.
     """
     from scipy.ndimage import map_coordinates, spline_filter
 
@@ -184,7 +185,7 @@ def _check_inside(result: PSFResult, at: tuple[float, float]) -> None:
 
 
 def _refuse_brighter_outside(result: PSFResult, peak: float) -> None:
-    """Raise an AccuracyError if the PSF is brighter outside the window, at a point that rays hit."""
+    """Raise an AccuracyError if the PSF exceeds `peak` at a place outside the window where rays land."""
     rays = result.requests[0].problem.rays if result.can_recompute and not result.holds_cells else None
     if rays is None or not len(rays):
         return
@@ -205,7 +206,8 @@ def _refuse_brighter_outside(result: PSFResult, peak: float) -> None:
 def _vertex(result: PSFResult, middle: tuple[int, int] | None = None) -> Peak:
     """Return the maximum of the paraboloid through the sample `middle` and its neighbours.
 
-    It is the sample itself if samples are means over cells, or if the paraboloid has no maximum.
+    The result is the sample itself if the samples are means over squares (`PSFResult.holds_cells`), or if the
+    paraboloid has no maximum.
 
     middle: (row, column); None: the brightest sample.
     """

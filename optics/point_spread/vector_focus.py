@@ -94,7 +94,7 @@ def _check_plain(pupil: Pupil, wavelength: float) -> None:
 
 
 def _check_rays(beam: Beam) -> None:
-    """Raise an AccuracyError if the sine of a ray's angle to the axis exceeds STEEPEST behind the pupil.
+    """Raise an AccuracyError if, for a ray behind the pupil, the sine of its angle to the axis exceeds STEEPEST.
 
     Evanescent light, for which the sine is above 1, is refused as well.
     """

@@ -1,6 +1,6 @@
 """PSFs in white light, and measures of these PSFs such as the Strehl ratio.
 
-Each type of receptor weights the spectrum of the lamp.
+The weight of each wavelength follows from the spectrum of the light source and the absorption of each receptor type.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
 
     @property
     def predicted_error(self) -> np.ndarray:
-        """Relative L2 error over the window, due to the spectrum and to the PSFs, (type,)."""
+        """Relative L2 error over the window, due to the number of wavelengths and to errors of their PSFs, (type,)."""
         found: np.ndarray = self.spectral_error + self.waves.plan.predicted_error * np.abs(self.weights).sum(axis=1)
         return found
 
@@ -138,11 +138,13 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
         centre: tuple[float, float] | None = None,
         with_error: bool = False,
     ) -> np.ndarray | Array:
-        """Return the fraction of the white light within circles, (type, radius). See `optics.encircled_energy`.
+        """Return the fraction of the white light within circles, (receptor type, radius).
 
-        The fraction is the sum of the encircled energies of all wavelengths, each times its weight in `weights`.
+        The fraction is the sum of the encircled energies of all wavelengths, each times its weight in `weights`. See
+        `optics.encircled_energy`.
 
-        radii, centre: radii [m] of the circles, and their centre (x, y) [m]; None for sample n//2.
+        radii: radii [m] of the circles.
+        centre: centre (x, y) [m] of the circles; None for the position of sample n//2, with n samples along each axis.
         with_error: True to return (value, predicted error).
 
         Raises:
@@ -237,7 +239,7 @@ def _weighed(result: PSFResult, catches: np.ndarray, ends: tuple[float, float]) 
 
 
 def _quantum_catch(light: Any, kinds: Any) -> np.ndarray:
-    """Return the quantum catch of each type of receptor (`kinds`) at steps of 1 nm, with the sum 1, (type, nm).
+    """Return the quantum catch of each type of receptor (`kinds`) at steps of 1 nm, (type, nm). Each row sums to 1.
 
     Raises:
         ValueError: the light is invalid, or a type does not absorb it.

@@ -61,7 +61,9 @@ def window_bytes(problem: Problem, sampling: Sampling) -> float:
 
 
 def check_window(window: Grid, dtype: str, count: int = 1, arrays: int = 1) -> None:
-    """Raise an AccuracyError if a window exceeds the limits on memory or time, whichever method computes the PSF.
+    """Raise an AccuracyError if a window exceeds the limits on memory or time.
+
+    The memory and time of the method that computes the PSF are not counted.
 
     count: number of PSFs over the window that exist at the same time.
     arrays: number of arrays of real numbers that are stored for each PSF.

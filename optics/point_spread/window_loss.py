@@ -1,11 +1,12 @@
-"""Errors of contrasts at each spatial frequency.
+"""Errors of a PSF's contrast at each spatial frequency, due to light outside the window.
 
-Light outside the window is missing in the integral ∫ PSF(x) exp(-2πi f·x) dx. Near f = 0, the error is all of this
-light. At other frequencies, contributions of different places cancel, and most of the error results from the sharp end
-of the samples at the sides of the window. If the samples fade towards the sides, this error disappears. It is therefore
-estimated as the difference between the spectra of sharp and fading samples. At some frequencies, such as those of the
-rings around the focus of an annulus, the lost light itself has contrast. This contrast is estimated from the outer
-parts of the window.
+The contrast at the frequency f is the modulus of ∫ PSF(x) exp(-2πi f·x) dx, divided by the value at f = 0. Light
+outside the window is missing in this integral. Near f = 0, the error is the sum of this light. At other frequencies,
+light from different places outside the window mostly cancels, and most of the error arises because the samples end
+abruptly at the sides of the window. This error disappears if the samples are multiplied by weights that fall smoothly
+to 0 towards the sides. It is therefore estimated as the difference between the spectra of the samples without and with
+such weights. At some frequencies, such as the frequency of the rings in the PSF of an annular aperture, light outside
+the window does not cancel. Its contribution is estimated from the light in the outer parts of the window.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ NEAR_ZERO = 2.0
 
 @dataclass(frozen=True, eq=False)
 class ErrorCauses(ReadOnlyArrays):
-    """Parts of the error of a PSF's contrasts, as fractions of all light that arrives, (wavelength,).
+    """Errors of the contrasts in a PSF's MTF, split by cause, as fractions of all light that arrives, (wavelength,).
 
     lost: upper bound on the light outside the window. It includes the uncertainty `light`.
     light: uncertainty of the amount of light that arrives.
@@ -45,7 +46,7 @@ class ErrorCauses(ReadOnlyArrays):
         return found
 
     def first(self, count: int) -> ErrorCauses:
-        """Return the parts of the error for the first `count` wavelengths."""
+        """Return the same errors for only the first `count` wavelengths."""
         return ErrorCauses(self.lost[:count], self.light[:count], self.rest[:count])
 
 
@@ -54,7 +55,8 @@ def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
 
     The frequencies are those of `MTF.fx`, along both axes.
 
-    Spectra have zeros, so each result is the largest estimate of nine neighbouring frequencies.
+    The estimate of the error may be 0 at a single frequency although the error is not. Each result is therefore the
+    largest of the estimates at a frequency and its eight neighbours.
 
     image: samples (y, x) of the PSF, as fractions of all light that arrives.
     lost: fraction of this light outside the window.
@@ -70,7 +72,7 @@ def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
 
 
 def _like_the_rest(image: np.ndarray, lost: float) -> np.ndarray:
-    """Return an estimate of what light outside the window contributes to the contrast at each frequency, (fy, fx).
+    """Return an estimate of the contrast that is due to light outside the window, at each frequency, (fy, fx).
 
     The estimate assumes that this light has the same contrasts as the light in the outer parts of the window.
     """
@@ -87,7 +89,7 @@ def _like_the_rest(image: np.ndarray, lost: float) -> np.ndarray:
 
 
 def _spectrum(image: np.ndarray) -> np.ndarray:
-    """Return the spectrum on a square grid, zero frequency at n//2."""
+    """Return the Fourier transform of an image, padded with zeros to n x n samples. Frequency 0 has the index n//2."""
     from scipy import fft
 
     side = max(image.shape)

@@ -37,9 +37,10 @@ class LinearMap:
 
 
 def mapped(field: Field, values: Complexes, grid: Grid, linear: LinearMap, z: Scalar = 0.0) -> Field:
-    """Return A u, a linear map A of a field u, as a field on a grid.
+    """Return the field A u on a grid, the result of applying a linear map A to a field u.
 
-    The result carries the derivatives that u carries, and those that A's parameter z carries if A has a rate ∂A/∂z.
+    The result carries the derivatives of u. If the rate ∂A/∂z of A is given (`LinearMap.rate`), the result also carries
+    the derivatives of the parameter z.
 
     field: u.
     values: A u (y, x), which has been computed before.

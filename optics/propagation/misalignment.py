@@ -15,8 +15,8 @@ The light w that leaves the tilted plane arrives at the next plane as
     Σ_j exp(ikcz_j) P(-z_j) [L_j(ζ) exp(-ikcζ) w],
 
 where P(-z_j) is the propagation from the depth z_j to the next plane. The second formula is the adjoint of the first
-one. It becomes the inverse if light at the angle θ is multiplied by 1 - tan α tan θ. Fields on tilted planes are stored
-without exp(ikζ).
+one. The second formula becomes the inverse of the first one if light at the angle θ is multiplied by 1 - tan α tan θ.
+Fields on tilted planes are stored without exp(ikζ).
 """
 
 from __future__ import annotations
@@ -105,9 +105,10 @@ class Alignment:
 
         If one depth is sufficient, that depth is 0.
 
-        Along a ray at the angle θ to the axis, the phase without the carrier changes by up to φ = kζ (1 - cos θ)/2,
-        with the largest depth ζ and the wave number k. Interpolation between n Chebyshev nodes has an error of at most
-        φⁿ / (2ⁿ⁻¹ n!).
+        Let ζ be the largest depth, k the wave number, and θ the largest angle of the light to the axis. Between the
+        depths 0 and ζ, the phase of the field without its carrier changes by at most φ = kζ (1 - cos θ)/2. The carrier
+        is the part of the field that varies fast with the depth. Interpolation between n Chebyshev nodes has an error
+        of at most φⁿ / (2ⁿ⁻¹ n!).
 
         radius: largest distance [m] from the centre.
         sine: largest sin θ of the light.
@@ -131,8 +132,8 @@ class Alignment:
     def weights(self, nodes: np.ndarray, grid: Grid, turns: float, types: Precision) -> list[np.ndarray]:
         """Return L_j(ζ) exp(2πi ζ turns) at the samples of a grid, as one array (y, x) per node j.
 
-        L_j are the Lagrange polynomials of the nodes, and ζ is the depth of the tilted plane. The grid is centred on
-        the plane's centre.
+        L_j are the Lagrange polynomials of the nodes, and ζ is the depth [m] of the tilted plane at a sample, relative
+        to the plane's centre. The grid is centred on the plane's centre.
 
         turns: number of waves per metre of depth [1/m].
         """
@@ -152,7 +153,7 @@ class Alignment:
         return found
 
     def error(self, sine: float) -> float:
-        """Return the relative error of the intensity because the effect of the plane's tilt is only approximated.
+        """Return the relative error of the intensity that is due to the approximate treatment of the plane's tilt.
 
         sine: largest sin θ of the light, where θ is its angle to the axis.
         """
@@ -196,8 +197,8 @@ class Depths:
     leaving: for the plane that the light leaves, depths [m], (depth,), and one array of interpolation weights (y, x)
         per depth, see `Alignment.weights`.
     arriving: the same for the plane at which the light arrives.
-    turns: (1 - c)/λ [1/m], where c = (1 + cos θ)/2 and θ is the largest angle of the light to the axis. By this number
-        of waves per metre of depth ζ, the carrier exp(ikcζ) of the field falls behind exp(ikζ).
+    turns: (1 - c)/λ [1/m], where c = (1 + cos θ)/2 and θ is the largest angle of the light to the axis. It is the
+        number of waves per metre of depth ζ by which the carrier exp(ikcζ) of the field falls behind exp(ikζ).
     slope: tangents of the tilt along x and y of the plane that the light leaves.
     """
 

@@ -1,8 +1,9 @@
 """A step of a system: the propagation of a field from one plane to the next.
 
 The samples of the next plane are as dense as its pupil requires. The Fourier transforms of the propagation repeat the
-field periodically. The pitch is reduced a little, so that the period is a whole number of samples of both planes. Fast
-Fourier transforms can then compute both the spectrum and the field that follows from it.
+field periodically. The pitch of the next plane's samples is reduced a little, so that the period is a whole multiple of
+the pitches of both planes. Fast Fourier transforms can then compute both the spectrum and the field that follows from
+it.
 
 Fields on tilted planes are interpolated between several depths (optics.propagation.misalignment). All depths of a step
 share one period, so each needs one transform.
@@ -79,10 +80,10 @@ class Stop:
     """A pupil, or the output window, at a distance from the previous stop.
 
     distance: distance [m] from the previous stop, negative for backward propagation.
-    pupil: None for the output window.
+    pupil: the pupil; None for the output window.
     half_width: half width [m] of the pupil with its soft edge, or of the window.
-    window: None for a pupil.
-    alignment: position of the pupil.
+    window: grid of the output window; None for a pupil.
+    alignment: centre of the pupil relative to the axis, and the pupil's tilt.
     along: the distance with its derivative.
     """
 
@@ -120,11 +121,11 @@ class Stop:
 class StepSettings:
     """Settings that are the same at every plane.
 
-    tolerance: tolerance of each step.
+    tolerance: largest relative L2 error of the intensity that each step from plane to plane may add.
     wavelength: wavelength in vacuum [m].
-    margin: amount [cycles per radius of a pupil] by which frequencies of diffracted light may exceed those of
-        geometrical rays. Light of higher frequencies is removed. Infinite: all light that can reach the next plane is
-        propagated.
+    margin: amount [cycles per radius of a pupil]. Light is removed behind the pupil if its frequency exceeds the
+        highest frequency of the geometrical rays by more than this amount. Infinite: all light that can reach the next
+        plane is propagated.
     """
 
     wavelength: float
@@ -174,8 +175,8 @@ class StepSettings:
 
         The period is the distance after which the step's Fourier transform repeats the field.
 
-        The grid is not changed if the step fades out no light, if the grid's pitch already divides the period, or if
-        too many samples would be necessary.
+        The grid is not changed if the step removes no light of high frequencies, if the grid's pitch already divides
+        the period, or if too many samples would be necessary.
         """
         source, coarsest, half_width = Grid(field.u.shape, field.dx), grid.dx, grid.half_width
         for _ in range(PITCHES):
@@ -213,9 +214,9 @@ class StepSettings:
         return out, mapped(before, out.u, grid, step_map(out, field.u.shape, depths), stop.along)
 
     def _depths(self, field: PlaneField, stop: Stop, grid: Grid) -> tuple[Depths, float]:
-        """Return the depths at which a step between tilted planes computes fields, and the error of the interpolation.
+        """Return the depths for a step between tilted planes, and the error of the intensity due to the interpolation.
 
-        The fields on the tilted planes are interpolated between the fields at these depths.
+        The step computes fields at these depths, and the fields on the tilted planes are interpolated between them.
         """
         source, sine, types = Grid(field.u.shape, field.dx), self.steep(field), precision(self.dtype)
         wavelength, allowed = self.wavelength / self.medium_n, self.tolerance / 4
@@ -254,9 +255,9 @@ class StepSettings:
     def steep(self, field: PlaneField) -> float:
         """Return the largest sin θ of the light that must be propagated accurately between tilted planes.
 
-        θ is the angle to the axis. If `field.kept` is None, the result is the largest sin θ of all light. Otherwise it
-        is that of the geometrical rays: the step fades out part of the diffracted light, and the rest at larger angles
-        than the rays is too weak to matter.
+        θ is the angle to the axis. If `field.kept` is None, the result is the largest sin θ of all light. Otherwise the
+        result is the largest sin θ of the geometrical rays. Light at larger angles is diffracted: the step fades out
+        part of this light, and the rest is too weak to matter.
         """
         frequency = field.band if field.kept is None else field.rays
         return min(frequency * self.wavelength / self.medium_n, 1.0)

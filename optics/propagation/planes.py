@@ -41,7 +41,8 @@ class PupilSampling:
     """Samples of a pupil, its soft aperture, and limits of the frequencies in the field behind it.
 
     soft: aperture with a softened edge. For a relief of pixels, the jumps between pixels are softened as well.
-    source: source that illuminates the pupil if no field arrives from a previous plane, relative to the pupil's centre.
+    source: source that illuminates the pupil if no field arrives from a previous plane. Its position is relative to the
+        pupil's centre.
     band, rays, kept: frequencies [1/m] in the field behind the pupil, see `PlaneField`.
     path: difference [m] between two paths of the source's light: the path to the centre of a decentred pupil, minus the
         path to the point of the system's axis at the same distance along the axis.
@@ -63,11 +64,11 @@ class PupilSampling:
     ) -> PupilSampling:
         """Return the sampling of the pupil at a stop.
 
-        The result's `band` is the highest frequency that must be sampled without aliases: the highest one that can
-        reach the next plane, or a lower one if the settings remove diffracted light (`StepSettings.margin`). Light
-        behind the pupil also has higher frequencies. The highest one is the sum of three: the highest frequencies of
-        the arriving light, of the pupil's phase and of the pupil's edge. Light above `band` may have aliases, but these
-        must lie above `band` as well.
+        The result's `band` is the highest frequency that must be sampled without aliases. It is the highest frequency
+        of light that can reach the next plane, or a lower limit if the settings remove diffracted light
+        (`StepSettings.margin`). Light behind the pupil also has frequencies above `band`, up to the sum of three: the
+        highest frequencies of the arriving light, of the pupil's phase and of the pupil's edge. Such light may have
+        aliases, but the frequencies of the aliases must lie above `band` as well.
 
         field: arriving field, before its propagation to the pupil. None: the source illuminates the pupil. The phase of
             the source's wave at the pupil is then treated as part of the pupil's phase.

@@ -1,14 +1,14 @@
 """Propagation of a sampled field from one plane to another, by its angular spectrum or by matrix products.
 
-The samples define a band-limited function, whose samples outside the given area are zero. Its spectrum is multiplied by
-the transfer function of free space and transformed onto the output samples:
+The given samples define a band-limited function, which is zero at all sampling points beyond them. Its spectrum is
+multiplied by the transfer function of free space and transformed onto the output samples:
 
     U(x, y; z) = F⁻¹{F{U₀} H}     (Goodman, §3.10.2; H in optics.propagation.transfer_function)
 
 A finite transform repeats the field periodically, so light that lands one period away would wrap around into the
 window. The period is long enough for light that lands near the window, and a smooth fade in the spectrum removes light
-that lands farther away. Light close to grazing incidence can be kept away in neither of these ways. The predicted error
-includes it.
+that lands farther away. Neither of them keeps light close to grazing incidence away from the window. The predicted
+error includes the effect of this light.
 """
 
 from __future__ import annotations
@@ -173,10 +173,11 @@ def propagated_between_depths(
 
 
 def step_map(result: PropagationResult, shape: tuple[int, int], depths: Depths | None) -> LinearMap:
-    """Return the propagation that gave `result` as a linear map of fields (y, x) of the shape `shape`.
+    """Return a linear map of fields (y, x) that repeats the propagation from which `result` was computed.
 
     The propagation must have used Fourier transforms, not matrix products.
 
+    shape: shape (y, x) of the fields before the propagation.
     depths: if a plane is tilted, the depths at which fields are computed, and between which they are interpolated.
     """
     how = result._sampling
@@ -210,7 +211,7 @@ def lit_part(field: np.ndarray) -> np.ndarray:
 def _propagated(
     sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
 ) -> tuple[TransformSampling | SeparableSampling, list[PropagatedPlane]]:
-    """Return the sampling of the propagation, and the propagated field of each source (y, x) in `sources`.
+    """Return the sampling of the propagation, and the propagated fields. `sources` holds the fields, (field, y, x).
 
     Matrix products are used if they are possible and predicted to be faster, and Fourier transforms otherwise.
     """
@@ -232,8 +233,8 @@ def _with_padding(
 ) -> tuple[TransformSampling, list[PropagatedPlane]]:
     """Return the sampling and the propagated fields, with enough padding to keep a blur away from the window.
 
-    The spectrum is truncated at the Nyquist frequency. Light at this frequency therefore causes a blur, which falls
-    with the padding of the Fourier transform.
+    The spectrum is truncated at the Nyquist frequency. Light at this frequency therefore causes a blur, which becomes
+    weaker if the padding of the Fourier transform is increased.
 
     If even the largest useful padding (`most_spare`) is insufficient, the samples themselves are too coarse. An initial
     padding of about √(λz) is then kept.

@@ -47,7 +47,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """The part A exp(ike) of a kernel that varies slowly, as a sum of products of a polynomial in ρx and one in ρy.
+    """The slowly varying part A exp(ike) of a kernel, as a sum of products of a polynomial in ρx and one in ρy.
 
     ρx and ρy are the offsets between a point of the source and a point of the window.
 
@@ -101,7 +101,7 @@ class SeparableSampling:
 
     @property
     def why(self) -> str:
-        """Reason for the sampling, as text for plans."""
+        """Reason why this sampling was chosen, as text for the `Plan` of a propagation."""
         paraxial = "; paraxial, as requested" if self.passage.paraxial else ""
         return f"distant window: the kernel is a sum of {self.terms.count} products of functions of x and y{paraxial}"
 
@@ -124,13 +124,13 @@ class SeparableSampling:
 
 @lru_cache(maxsize=64)
 def separable(passage: Passage, source: Grid, window: Grid, allowed: float) -> SeparableSampling | None:
-    """Return a sampling of the separable kernel with which the intensity has a predicted error of at most `allowed`.
+    """Return a sampling for propagation by a separable kernel, with a predicted error of at most `allowed`.
 
-    The kernel is the field of a point source, written as a sum of products of functions of x and y. The result is None
-    if the passage requires Fourier transforms (`by_transforms`), its distance z is 0, a plane has more than
-    MOST_SAMPLES samples along a side, or more than MOST_TERMS products are necessary. It is also None if light at the
-    Nyquist frequency of the source reaches the window, or if the passage has a `limit`, a band of frequencies beyond
-    which light must be removed.
+    The error is that of the intensity. The kernel is the field of a point source, written as a sum of products of
+    functions of x and y. The result is None if the passage requires Fourier transforms (`by_transforms`), its distance
+    z is 0, a plane has more than MOST_SAMPLES samples along a side, or more than MOST_TERMS products are necessary. It
+    is also None if light at the Nyquist frequency of the source reaches the window, or if the passage has a `limit`, a
+    band of frequencies beyond which light must be removed.
     """
     largest = max(*source.shape, *window.shape)
     if passage.z == 0 or passage.by_transforms or passage.limit is not None or largest > MOST_SAMPLES:
@@ -149,10 +149,10 @@ def separable(passage: Passage, source: Grid, window: Grid, allowed: float) -> S
 
 
 def _terms(passage: Passage, range_x: Range, range_y: Range, allowed: float) -> Terms | None:
-    """Return the slowly varying part of the kernel as a sum of as few products as possible.
+    """Return the slowly varying part of the kernel as a sum of products of a polynomial in x and one in y.
 
-    The largest relative error of the sum is at most `allowed`. The result is None if this needs more than MOST_TERMS
-    products.
+    The sum has as few products as possible for a largest relative error of at most `allowed`. The result is None if
+    more than MOST_TERMS products are necessary.
     """
     x, y = (np.linspace(*span, CHECKED) for span in (range_x, range_y))
     exact = _slow_part(passage, x[None, :], y[:, None])
@@ -237,9 +237,10 @@ def _phasor(passage: Passage, path: np.ndarray | float) -> np.ndarray:
 
 
 def _amplitude(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
-    """Return the amplitude of the kernel, without exp(ik distance), for points that are (x, y, z) apart [m].
+    """Return the amplitude A of the kernel A exp(ikD) for two points with the lateral offsets x and y [m].
 
-    Paraxially, it is 1/(iλz), where λ is the wavelength.
+    D is the distance between the points, and k the wave number. In the paraxial case, A is 1/(iλz), where λ is the
+    wavelength and z the distance between the points' planes.
     """
     k, z = 2 * np.pi / passage.wavelength, abs(passage.z)
     if passage.paraxial:

@@ -11,8 +11,8 @@ frequency of the kernel within each pixel. Large pixels are divided into several
 
 On a tilted pupil, samples that are evenly spaced in a plane perpendicular to the axis have the coordinates x' = a x + b
 y and y' = b x + d y along the pupil. If b is not 0, the convolution is evaluated along x first and then along y. In
-either case, the samples along the one coordinate are shifted by an amount proportional to the other coordinate (a
-shear). The shifts are phase factors of a spectrum.
+each of these two steps, the samples along one coordinate are shifted by an amount proportional to the other coordinate
+(a shear). Phase factors on a spectrum produce the shifts.
 """
 
 from __future__ import annotations
@@ -43,12 +43,14 @@ RIPPLES = 8.0
 
 @dataclass(frozen=True, eq=False)
 class SoftPixels:
-    """Opening and pixels of a pupil, convolved with a kernel. Lengths are in radii R, frequencies in cycles per R.
+    """Convolution of the transmittance of a pupil that consists of pixels with a kernel, which softens all edges.
 
-    edge: kernel along x and along y.
-    aperture: opening, divided into the pixels or into parts of them.
-    across: number of nodes along a pixel.
-    ripple: ripple of the kernel's spectrum.
+    Lengths are in radii R of the pupil, frequencies in cycles per R.
+
+    edge: kernel along one axis; the same kernel is used along x and along y.
+    aperture: opening of the pupil, divided into quadrature cells. A cell is a pixel or a part of one.
+    across: number of quadrature nodes along a side of a cell.
+    ripple: largest deviation of the kernel's spectrum from 1 in the passband and from 0 in the stopband.
     alignment: position of the pupil. If the pupil is tilted, samples are farther apart along the pupil than in a plane
         perpendicular to the axis.
     """
@@ -69,7 +71,7 @@ class SoftPixels:
 
         Raises:
             ValueError: the radius of the pupil carries a derivative.
-            AccuracyError: the pixels need too many nodes.
+            AccuracyError: the convolution needs too many quadrature nodes within the pixels.
         """
         if carries_derivative(pupil.aperture_radius):
             raise ValueError(
@@ -93,9 +95,9 @@ class SoftPixels:
 
     @property
     def stopband(self) -> float:
-        """Highest frequency of the softened transmittance in a plane perpendicular to the axis, in cycles per R.
+        """Highest frequency of the softened transmittance, in cycles per R.
 
-        R is the radius of the pupil.
+        Positions are measured in a plane perpendicular to the axis. R is the radius of the pupil.
         """
         return _stretch(self.alignment) * self.edge.stopband
 
@@ -108,8 +110,8 @@ class SoftPixels:
         """Return the relative error of the intensity behind the softened pupil.
 
         The pupil's transmittance is softened by convolution with a kernel. The error has four causes: the kernel
-        slightly changes the frequencies that it should pass unchanged, the convolution is a sum over nodes instead of
-        an integral, the aperture's edge cuts pixels, and numbers are rounded.
+        slightly changes the amplitudes of frequencies that should pass unchanged, the convolution is a sum over nodes
+        instead of an integral, the aperture's edge cuts pixels, and numbers are rounded.
         """
         periods = max(1.0, 2 * self.edge.stopband * self.aperture.widest)
         cut = 2 * periods * self.aperture.cut_share * 10.0**-MOMENT_DIGITS
@@ -145,11 +147,15 @@ class SoftPixels:
 
 @dataclass(frozen=True, eq=False)
 class _Filter:
-    """Convolution along one axis, from nodes to samples, for each position along the other axis.
+    """Convolution along one axis, which computes values at samples of a grid from values at quadrature nodes.
+
+    It is applied for each position along the other axis.
 
     matrix: values of the kernel (sample, node); None if the samples are shifted by an amount that depends on the
-        position along the other axis. Then `factors` are from_nodes (frequency, node), shifts (frequency, other) and
-        onto_samples (sample, frequency).
+        position along the other axis.
+    factors: three arrays that replace the matrix in this case. The first, (frequency, node), transforms values at the
+        nodes to a spectrum. The second, (frequency, position), multiplies the spectrum by that of the kernel and shifts
+        the samples. The third, (sample, frequency), transforms the spectrum to values at the samples.
     """
 
     matrix: np.ndarray | None
@@ -189,11 +195,12 @@ class _Filter:
         return found
 
     def adjoint(self, values: np.ndarray) -> np.ndarray:
-        """Return the adjoint of the linear map `forward`, applied to values at the samples.
+        """Apply the adjoint of the linear map `forward` to values at the samples, and return values at the nodes.
 
-        The filter acts along x or along y. Samples and nodes lie along this axis, and positions along the axis
-        perpendicular to it. The adjoint is applied for each position along the perpendicular axis. `values` is an array
-        (sample, position), and the result is an array (node, position).
+        The filter acts along x or along y. It computes values at samples of a grid from values at quadrature nodes.
+        Samples and nodes lie along its axis, and positions along the axis perpendicular to it. The adjoint is applied
+        for each position along the perpendicular axis. `values` is an array (sample, position), and the result is an
+        array (node, position).
         """
         if self.matrix is not None:
             return _product(self.matrix.T, values)

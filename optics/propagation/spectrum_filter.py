@@ -30,7 +30,7 @@ ONE = np.ones(1)  # stands for equal weights in a sum
 
 @dataclass(frozen=True)
 class PropagatedPlane:
-    """A propagated plane.
+    """The field in a plane after propagation, with its errors.
 
     u: field (y, x).
     error: predicted error of the intensity.
@@ -67,14 +67,17 @@ class ScaledPlane:
         return cls(plane, _power(plane), brightest)
 
     def restored(self, result: np.ndarray) -> np.ndarray:
-        """Return the propagated field, multiplied by `brightest`."""
+        """Return the field after propagation, `result`, multiplied by `brightest`, which undoes the division."""
         return result if self.brightest == 1 else result * result.dtype.type(self.brightest)
 
 
 def filtered(
     given: np.ndarray, how: TransformSampling, types: Precision, depths: Depths | None = None
 ) -> PropagatedPlane:
-    """Return a plane (y, x) after propagation. If `depths` is given, the two planes may be tilted."""
+    """Return the field in a window after propagation from another plane. If `depths` is not None, planes may be tilted.
+
+    given: field in the other plane, (y, x).
+    """
     scaled = ScaledPlane.from_plane(given, types)
     plane, total = scaled.u, scaled.power
     if total == 0:
@@ -153,10 +156,10 @@ def _middle(shape: tuple[int, int], part: tuple[int, int]) -> tuple[slice, ...]:
 
 
 def _spectrum(plane: np.ndarray, how: TransformSampling) -> np.ndarray:
-    """Return the spectrum of a plane (y, x).
+    """Return the spectrum of the field in a plane (y, x).
 
-    If `how.step` is 0, its axes are (fy, fx), with frequency 0 in the centre. Otherwise they are (fx, fy), in the order
-    of a fast Fourier transform.
+    If `how.step` is 0, the axes of the spectrum are (fy, fx), with frequency 0 in the centre. Otherwise they are (fx,
+    fy), in the order of a fast Fourier transform.
     """
     if how.step:
         return periodic_spectrum(plane, how.period, how.across)
@@ -188,7 +191,11 @@ def evanescent_share(plane: np.ndarray, period: int, dx: float, passage: Passage
 
 
 def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
-    """Return Σ w |u|², with one weight for each real and each imaginary part of u. It is 0 if `weight` is None."""
+    """Return Σ w |u|² over all samples of u, or 0 if `weight` is None.
+
+    weight: weights w. An array other than ONE has two equal entries in succession for each sample, one for the real and
+        one for the imaginary part.
+    """
     if weight is None:
         return 0.0
     if weight is ONE:
@@ -199,9 +206,10 @@ def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
 
 @lru_cache(maxsize=4)
 def _free_space(how: TransformSampling, dtype: str) -> TransferFunction:
-    """Return the transfer function over the spectrum, including the normalisation of the transforms.
+    """Return the transfer function for all frequencies of a spectrum, divided by period² to normalise the transforms.
 
-    It is cached, because it takes more time than the transforms, and the same distance is often used again.
+    The Fourier transforms to and from the spectrum are not normalised themselves. The result is cached, because it
+    takes more time than the transforms, and the same distance is often used again.
     """
     step = 1 / (how.period * how.source.dx)
     if how.step:  # the axes of the spectrum are (fx, fy)

@@ -34,9 +34,9 @@ class SystemStep:
 
 @dataclass(frozen=True, eq=False)
 class StackResult(ReadOnlyArrays, OnWindow):
-    """A field behind a system.
+    """The field behind a system of pupils and free space.
 
-    u: complex field (y, x) at the pitch dx [m], with the carrier exp(ikz). Sample n//2 is on the axis.
+    u: complex field (y, x) at the pitch dx [m], including the carrier exp(ikz). Sample n//2 is on the axis.
     steps: power and accuracy of each propagation from plane to plane.
     predicted_error: relative L2 error of the intensity.
     window: grid of the samples [m]; `x` and `y` are the positions of its columns and rows.

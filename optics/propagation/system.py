@@ -61,8 +61,8 @@ def propagate_through(
 
     Raises:
         ValueError: an argument is invalid (named with its value and valid range), u, the source or a misalignment
-            carries derivatives, two pupils touch, the radius of a pupil of pixels carries a derivative, the output lies
-            in the plane of such a pupil, or the medium is dispersive or differs between elements.
+            carries derivatives, two pupils touch, a pupil of pixels lies in the plane of the output or its radius
+            carries a derivative, or the medium is dispersive or differs between elements.
         AccuracyError: no sampling meets the tolerance, or a pupil is tilted too much to meet it.
         BackendError: see `optics.psf`.
     """
@@ -108,7 +108,7 @@ def propagate_through_batch(
 
 @dataclass(frozen=True)
 class _Light:
-    """Arguments of `propagate_through` except the elements: light in front of a system, and the requested output."""
+    """Arguments of `propagate_through` except `elements`: the light that enters a system, and the requested output."""
 
     u: np.ndarray | None
     wavelength: float
@@ -164,9 +164,10 @@ class _Light:
 
 
 def _with_carrier(tracked: Field, stops: list[Stop], settings: StepSettings) -> tuple[tuple[Array, Array], Array]:
-    """Return the real and imaginary part, and the intensity, as tensors (y, x) with derivatives.
+    """Return the field (real and imaginary part) and its intensity, with all derivatives, as tensors (y, x).
 
-    tracked: the field, without the derivative of its carrier exp(ikz) with respect to the distances.
+    tracked: the field. It lacks the derivative of its carrier exp(ikz) with respect to the distances, which this
+        function adds.
     """
     types = tracked.types
     change = sum(opaque(types, stop.along) - number(stop.along) for stop in stops)
@@ -255,13 +256,14 @@ def _passed(
 
 
 def _error(steps: list[SystemStep], edges: list[float], tolerance: float, tilted: float) -> float:
-    """Return the sum of the errors of the steps, of the soft edges in front of them, and of tilts.
+    """Return the error of a result: the sum of the errors due to the steps, to soft edges and to tilts of pupils.
 
-    Errors are relative to the light at their step. If only a fraction of this light arrives at the end, the relative
-    error of the result is larger, so each error is divided by the square root of this fraction.
+    A soft edge is the smoothed edge of the aperture from which a step starts. Errors are relative to the light at their
+    step. If only a fraction of this light arrives at the end, the relative error of the result is larger, so each error
+    is divided by the square root of this fraction.
 
-    edges: errors of the soft edge in front of each step.
-    tilted: sum of the errors due to tilts.
+    edges: error of the soft edge at the start of each step.
+    tilted: sum of the errors due to tilts of pupils.
 
     Raises:
         AccuracyError: the sum exceeds the tolerance.

@@ -70,7 +70,7 @@ def light_in_front(
 def stops_of(elements: Sequence[Element], backward: bool, window: Grid) -> list[Stop]:
     """Return the stops: the pupils, each with the distance in front of it, and the output window as the last stop.
 
-    Distances of adjacent elements of free space are added, which is exact. Pupils that touch raise a ValueError.
+    The lengths of adjacent elements of free space are added, which is exact. Pupils that touch raise a ValueError.
     """
     if not elements:
         raise ValueError("elements is empty: must hold at least one Pupil or FreeSpace")

@@ -12,10 +12,10 @@ Light at an angle θ to the axis moves z tan θ to the side. If this exceeds the
 to the far edge of the other, the light cannot reach the window. It is faded out, because it would otherwise wrap
 around.
 
-A fade of the spectrum blurs the field over a distance that is inversely proportional to the fade's width in frequency.
-Faded light must not be blurred into the window. It must therefore land outside the window by at least the blur
-distance, which is large for a narrow fade. A wide fade, however, ends at a high frequency, whose light moves far to the
-side. The width is a compromise between the two.
+To fade light out, the spectrum is multiplied by factors that fall from 1 to 0. This blurs the field over a distance
+that is inversely proportional to the width of the fade in frequency. Faded light must not be blurred into the window.
+It must therefore land outside the window by at least the blur distance. A narrow fade has a large blur distance. A wide
+fade, however, ends at a high frequency, whose light moves far to the side. The width is a compromise between the two.
 """
 
 from __future__ import annotations
@@ -79,10 +79,10 @@ class Band:
         return self.kept + self.fade
 
     def diagonal(self, wavelength: float) -> float:
-        """Return the highest radial frequency [1/m] of a square band.
+        """Return the highest radial frequency √(fx² + fy²) [1/m] of a square band (`Band.square`).
 
-        At this frequency, fx = fy, and fx / √(1 - λ²fy²) equals `kept` + `fade`, at which the fade along x reaches 0. λ
-        is the wavelength [m] in the medium.
+        There, fx = fy. Light is faded out completely where fx / √(1 - λ²fy²) reaches `kept` + `fade`. λ is the
+        wavelength [m] in the medium.
         """
         return math.sqrt(2) * self.end / math.hypot(1, self.end * wavelength)
 
@@ -99,9 +99,9 @@ def walk(frequency: float, wavelength: float, z: float, paraxial: bool = False) 
 def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
     """Return the band of the light whose sideways displacement over the distance z is at most `corner` [m].
 
-    Light of higher frequencies is faded out. The width of the fade is chosen so that the Fourier transforms of the
-    propagation can have the shortest period. The result is `EVERYTHING`, without a fade, if z is 0 or if every fade
-    would end too near grazing incidence.
+    Light of higher frequencies is faded out. The fade has the width with which the period of the Fourier transforms can
+    be shortest. The result is `EVERYTHING`, without a fade, if z is 0 or if a fade of any width would include light too
+    near grazing incidence.
 
     ripple: fraction of the amplitude of faded light that may land at displacements of at most `corner`. Some of it
         lands there, because the fade blurs the field.
@@ -115,12 +115,11 @@ def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxia
     Light that moves farther along x or y is faded out. In a square window, displacements as far as a corner occur only
     along the diagonals. The round band of `kept_band` includes displacements of this length in every direction, so the
     square band can be smaller. Unless paraxial=True, the displacement along x depends on fx / √(1 - λ²fy²) instead of
-    fx alone, so the fade along x is a function of this expression. It blurs the field over a larger distance than a
-    fade in fx. The ratio of the two distances is the largest gradient of the expression. The result is `EVERYTHING`,
-    without a fade, if z is 0 or if every fade would end at too large an angle.
+    fx alone, so the fade along x is a function of this expression. This fade blurs the field over a larger distance
+    than a fade in fx. The ratio of the two distances is the largest gradient of the expression. The result is
+    `EVERYTHING`, without a fade, if z is 0 or if a fade of any width would end at too large an angle.
 
-    ripple: fraction of the amplitude of faded light that may land at displacements of at most `half` because of the
-        blur.
+    ripple: largest fraction of the faded light's amplitude that may be blurred to displacements of at most `half`.
     """
     return _shortest(half, wavelength, z, ripple, paraxial, square=True)
 
@@ -128,11 +127,11 @@ def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxia
 def limited_band(kept: float, fade: float, wavelength: float, z: float, ripple: float) -> Band:
     """Return the band of light that is unchanged up to `kept` [1/m] and faded out up to `kept` + `fade`.
 
-    These limits do not depend on which light can reach the next plane. The result is `EVERYTHING` if light at the
-    frequency kept + fade is too near grazing incidence.
+    This band is for a caller that sets the limits itself, unlike `kept_band` and `kept_square`. The result is
+    `EVERYTHING` if light at the frequency kept + fade is too near grazing incidence.
 
-    ripple: fraction of the amplitude of faded light that the blur may move beyond the distance for which `Band.walk`
-        allows. The smaller the fraction, the larger is this distance.
+    ripple: largest fraction of the faded light's amplitude that may land beyond `Band.walk`, because the fade blurs the
+        field. The smaller the fraction, the larger is `Band.walk`.
     """
     if (kept + fade) * wavelength >= PERIOD_MAX_SINE:
         return EVERYTHING
@@ -167,8 +166,8 @@ def _walk(band: Band) -> float:
 def _gradient(sine: float) -> float:
     """Return the largest gradient |∇F| of F(fx, fy) = fx / √(1 - λ²fy²).
 
-    Over a distance z, light moves zλF / √(1 - λ²F²) along x. A square band (`Band`) is faded out along x by a function
-    of F.
+    Over a distance z, light moves zλF / √(1 - λ²F²) along x. In a band with `Band.square`, the fade along x is a
+    function of F.
 
     sine: largest value of λ|F| and of λ|fy|, where λ is the wavelength, and fx and fy are spatial frequencies.
     """
@@ -193,7 +192,7 @@ def _fade_table(ripple: float) -> Interpolant:
     """Return a function that decreases from f(0) = 1 to f(1) = 0: the complement of the integral of a Kaiser window.
 
     A fade of this shape over a band of width Δf blurs a field over the distance β/(π Δf), where β is the window's
-    parameter. The fraction `ripple` of the faded light's amplitude is blurred farther than this.
+    parameter. A fraction `ripple` of the amplitude of the faded light lands beyond this distance.
     """
     beta = kaiser_beta(ripple)
     nodes, weights = np.polynomial.legendre.leggauss(math.ceil(beta) + 24)
@@ -231,8 +230,8 @@ class Passage:
     paraxial: True for Fresnel's approximation.
     band: band of the light that can reach the window.
     centre: position (x, y) [m] of the window.
-    ripple: fraction of the amplitude of faded light that may still reach the window. Light outside the band is faded
-        out. The fade blurs the field, so some of this light reaches the window although it would otherwise miss it.
+    ripple: light outside the band is faded out, which blurs the field, so some of this light reaches the window.
+        `ripple` is the largest fraction of its amplitude that may do so.
     limit: band beyond which light is removed although it could reach the window; None if there is no limit.
     by_transforms: True if Fourier transforms must not be replaced by matrix products.
 

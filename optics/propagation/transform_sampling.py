@@ -1,7 +1,7 @@
 """The period of a finite transform, chosen long enough to keep light from wrapping around into the window.
 
-A finite transform repeats the field every period. Light of frequency f moves z tan θ to the side, with sin θ = λ|f|. If
-it lands near the window, the period must be long enough. Light that lands farther away is faded out instead.
+A finite transform repeats the field every period. Over a distance z, light of frequency f moves z tan θ sideways, sin θ
+= λ|f|. If it lands near the window, the period must be long enough. Light that lands farther away is faded out.
 
 If no light can be faded, the spectrum is truncated at the Nyquist frequency f_N, which causes a blur. Along one axis,
 the field is ∫ S(f) e^{2πi (f x + z √(1/λ² - f²))} df up to f_N. The contribution of the integral's end is
@@ -12,8 +12,8 @@ where walk(f) = z tan θ is the sideways displacement of light of frequency f, a
 This is the first term of an integral's expansion about its end (Bleistein & Handelsman, Asymptotic Expansions of
 Integrals, §3.2). It decreases slowly with d, so the blur of the next period reaches the window. Consider a source of
 width L that emits light of the frequency f_N evenly and incoherently, and the copy of this source in the next period.
-Let g be the gap between the place where light of the copy lands and a window of width W. The power that comes back into
-the window, divided by the power |S|² at the end of the spectrum, is
+Let g be the gap between the place where light of the copy lands and a window of width W. The power that the blur brings
+into the window, divided by the power |S|² at f_N, is
 
     ∫_0^L ds/L ∫_0^W dx / (2π (g + s + x))² = ln(1 + L W / (g (g + L + W))) / (4π² L).                             (2)
 """
@@ -54,7 +54,7 @@ NYQUIST_SHARE, NYQUIST_LINES = 1 / 16, 9
 class TransformSampling:
     """Sampling of a transform between two planes.
 
-    period: period in samples of the source.
+    period: period of the Fourier transform in samples of the source.
     across: number of frequencies along each axis.
     step: pitch of the window in samples of the source if the pitch is a whole number of samples, else 0.
     reach: sideways distance [m] from an edge of the source to the opposite edge of the window, along x or along y,
@@ -102,7 +102,7 @@ class TransformSampling:
 
     @property
     def why(self) -> str:
-        """Reason for the sampling, in words, which the plan of a result of `propagate` contains."""
+        """Text that gives the reason for the sampling, used in the plan of a result of `propagate`."""
         band = self.passage.band
         kept = f"band {band.kept * self.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
         paraxial = "; paraxial, as requested" if self.passage.paraxial else ""
@@ -125,9 +125,9 @@ class KeptLight:
 def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
     """Return the light that can reach the window: its band of frequencies and the distance `KeptLight.reach`.
 
-    If `passage.limit` is a band, this band is used instead. If the band extends beyond the spectrum, which ends at the
-    Nyquist frequency of the source's samples, the spectrum contains no light outside the band that could be faded out.
-    The band is then replaced by one that contains all frequencies.
+    If `passage.limit` is a band, this band is used instead. The spectrum ends at the Nyquist frequency of the source's
+    samples. If the band contains the whole spectrum, no light can be faded out, and the band is replaced by one that
+    contains all frequencies.
     """
     wavelength, z, ripple, paraxial = passage.wavelength, abs(passage.z), passage.ripple, passage.paraxial
     # The source is extended by one sample, because the band-limited function extends beyond the outermost samples.
@@ -149,13 +149,13 @@ def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
 
 @lru_cache(maxsize=64)
 def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> TransformSampling:
-    """Return the sampling of transforms that propagate a field from a source to a window with the shortest period.
+    """Return the sampling with the shortest possible period for propagating a field from a source to a window.
 
-    The result's `passage` is the argument `passage`, with its band replaced by that from `kept_light`.
+    The result's `passage` equals the argument, except that its band of frequencies comes from `kept_light`.
 
-    spare: length [m] by which the period is extended if no light can be faded out, because light of every frequency in
-        the spectrum lands in or near the window. The spectrum is then truncated at the Nyquist frequency, which blurs
-        the field, and the longer period keeps the blur away from the window.
+    spare: length [m] by which the period is extended if light of every frequency lands in or near the window, so that
+        none can be faded out. The spectrum is then truncated at the Nyquist frequency, which blurs the field, and the
+        longer period keeps the blur away from the window.
 
     Raises:
         AccuracyError: the period needs more samples than the limit.
@@ -185,10 +185,10 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
 def most_spare(passage: Passage, source: Grid) -> float:
     """Return the largest useful value of `spare` [m], the length by which `sampling` extends a transform's period.
 
-    A Fourier transform repeats the field every period, and the truncation of the spectrum blurs it. A longer period
-    keeps the blurred light of the next repetition away from the window, but an extension beyond the returned length has
-    no further effect. The result is an upper bound. It assumes that the light with the largest displacement, at the
-    spectrum's corner (√2 times the Nyquist frequency), moves along x or y instead of along the diagonal.
+    A Fourier transform repeats the field every period, and the truncation of the spectrum blurs the field. A longer
+    period keeps the blurred light of the next repetition away from the window, but an extension beyond the returned
+    length has no further effect. The result is an upper bound. Light at the spectrum's corner (√2 times the Nyquist
+    frequency) moves farthest. It is assumed to move along x or y instead of along the diagonal.
     """
     nyquist, z, paraxial = 0.5 / source.dx, abs(passage.z), passage.paraxial
     end = math.sqrt(2) * nyquist
@@ -211,7 +211,7 @@ def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> fl
 
 
 def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
-    """Return the power [units of Σ|u|²] of the light that a truncated spectrum blurs into the window.
+    """Return the power [units of Σ|u|²] that reaches the window because truncation of the spectrum blurs the field.
 
     A Fourier transform repeats the field every period. The field is blurred, because its spectrum is truncated at the
     Nyquist frequency, so light of the next repetition reaches the window. It is assumed that light of this frequency
@@ -236,10 +236,11 @@ def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
 
 
 def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
-    """Return the amplitude of the blur in the sampling `roomier`, which has a longer period, divided by that in `how`.
+    """Return the blur's amplitude in the sampling `roomier`, with its longer period, divided by that amplitude in
+    `how`.
 
-    The blur is light that a truncated spectrum moves into the window (see `blurred_back`). It is assumed that the power
-    at the Nyquist frequency along one axis does not depend on the frequency along the other axis.
+    The blur is light that reaches the window because the spectrum is truncated (see `blurred_back`). It is assumed that
+    the power at the Nyquist frequency along one axis does not depend on the frequency along the other axis.
     """
     power, left = (sum(float(_blur_weights(sampling, axis).sum()) for axis in (0, 1)) for sampling in (how, roomier))
     return math.sqrt(left / power) if power else 1.0
@@ -247,16 +248,15 @@ def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
 
 @lru_cache(maxsize=8)
 def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
-    """Return the power that is blurred into the window, divided by the power |U|² at the Nyquist frequency f_N.
+    """Return the power that a blur brings into the window, divided by the power |U|² at the Nyquist frequency f_N.
 
     The spectrum is truncated at f_N along an axis, which blurs the field. A Fourier transform repeats the field every
-    period, so the blur b of the next repetition reaches the window. U = Σ u e^{-2πi...} is the sum over samples of the
-    source, and the power of the blur is a sum of |b|² over samples at the pitch dx. The result is a product. Its first
-    factor is ∫|b|² dx / |S|², from equation (2) in the module's docstring, where S = U dx is the spectrum as an
-    integral. The factor dx² converts |S|² to |U|², and 1/dx converts the integral to a sum along the axis. By
-    Parseval's theorem, 1/period converts a sum over frequencies along the other axis to one over samples. A factor of 2
-    stands for the two ends ±f_N of the spectrum. The last factor is the fraction of the light that lands within the
-    window's range along the other axis.
+    period, so the blur b around the next repetition extends into the window. U = Σ u e^{-2πi...} is a sum over the
+    source's samples, and the blur's power is a sum of |b|² over samples at the pitch dx. The result is a product. Its
+    first factor is ∫|b|² dx / |S|², from equation (2) in the module's docstring, where S = U dx. The factor dx²
+    converts |S|² to |U|², and 1/dx converts the integral to a sum along the axis. By Parseval's theorem, the factor
+    1/period converts a sum over frequencies along the other axis to a sum over samples. A factor of 2 is for the two
+    ends ±f_N. The last factor is the fraction of light that lands within the window's range along the other axis.
 
     axis: axis of the blur, 0 for y, 1 for x. The result has one value per frequency along the other axis, (frequency,).
     """

@@ -67,11 +67,12 @@ class SpectralBands(ReadOnlyArrays):
 
         The spectrum may have any shape. It may, for example, contain the narrow lines of a fluorescent lamp, although
         samples at the bands' centres would miss such lines. The values are first computed as means over the bands,
-        weighted by the receptors' sensitivity and relative to daylight. They are then adjusted by the smallest change
-        that makes Σ_b weights[c, b] values[b] equal to the quantum catch of receptor type c. The quantum catch is an
-        integral over wavelengths in steps of 1 nm, divided by the catch from a white surface in daylight. If there are
-        fewer bands than types, this equality is possible only in the least-squares sense. If a spectrum with lines is
-        divided into few bands, a value may be negative.
+        weighted by the receptors' sensitivity and relative to daylight. They are then changed as little as possible, so
+        that the sum Σ_b weights[c, b] values[b] over the bands b equals the quantum catch of each receptor type c,
+        where weights are the attribute `weights`. The quantum catch is an integral over wavelengths in steps of 1 nm,
+        divided by the catch from a white surface in daylight. If there are fewer bands than types, this equality is
+        possible only in the least-squares sense. If a spectrum with lines is divided into few bands, a value may be
+        negative.
 
         radiance: a Spectrum, or a function of wavelengths [m]. For a surface, it is reflectance times illuminant.
         receptors: the receptors for which these bands were made.
@@ -108,7 +109,7 @@ class SpectralBands(ReadOnlyArrays):
 def _nonnegative(weights: np.ndarray, catches: np.ndarray, means: np.ndarray) -> np.ndarray:
     """Return band values x >= 0 for which weights @ x is closest to the quantum catches of the receptor channels.
 
-    Among several such x, return the one closest to the means of the spectrum over the bands.
+    Among several such x, return the one closest to `means`, the means of a spectrum over the bands.
     """
     from scipy.optimize import lsq_linear
 

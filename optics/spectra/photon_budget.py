@@ -1,4 +1,4 @@
-"""Number of photons that a receptor absorbs from a white surface (signal 1), computed from the light level."""
+"""Number of photons that a receptor absorbs from a white surface, whose signal is 1, computed from the light level."""
 
 from __future__ import annotations
 

@@ -21,10 +21,10 @@ LAMBDA_MAX_NM = (330.0, 700.0)
 
 @dataclass(frozen=True)
 class _Template:
-    """Parameters of a template: the α band and the β band.
+    """Parameters of a pigment template of Govardovskii et al. (2000): the α band and the β band.
 
-    The α band is 1 / (exp A(a - x) + exp B(b - x) + exp C(c - x) + D) with x = λmax/λ (eq. 1). The β band is a Gaussian
-    (eq. 4).
+    The α band is 1 / (exp A(a - x) + exp B(b - x) + exp C(c - x) + D) with x = λmax/λ (their eq. 1). The β band is a
+    Gaussian (their eq. 4).
 
     A, a, beta_peak [nm] and beta_width [nm] are functions of λmax [nm]; the other parameters are numbers.
     """

@@ -20,9 +20,10 @@ class ReceptorDynamics:
     time_constant_ms: time constant τ of the low-pass filter [ms]
     order: order n of the filter, 1 or 2: h(t) = tⁿ⁻¹ exp(-t/τ) / τⁿ
     latency_ms: additional delay [ms], rounded to whole frames
-    adaptation: gain control by m, the exponentially weighted mean of the signal s over the time `adaptation_ms`, with d
-        = `dark_light`. "none": no gain control; "naka_rushton": s / (s + m + d), about 1/2 in constant bright light
-        (Naka & Rushton 1966, J. Physiol. 185:536); "logarithmic": ln((s + d) / (m + d)), which is 0 in constant light
+    adaptation: gain control. In the formulas, m is the exponentially weighted mean of the signal s over the time
+        `adaptation_ms`, and d is `dark_light`. "none": no gain control; "naka_rushton": s / (s + m + d), about 1/2 in
+        constant bright light (Naka & Rushton 1966, J. Physiol. 185:536); "logarithmic": ln((s + d) / (m + d)), which is
+        0 in constant light
     adaptation_ms: time constant of the mean m [ms]
     dark_light: signal that is equivalent to the receptor's spontaneous activity, relative to the signal of white in
         daylight
@@ -34,7 +35,7 @@ class ReceptorDynamics:
         receptors. The inputs are a, the signal of the left receptor, and b, the signal of the right one. D is a
         low-pass filter, which delays a signal. "hassenstein_reichardt" (1956): D(a) b - a D(b). "barlow_levick" (1965):
         max(a - D(b), 0) - max(b - D(a), 0). In each term, the delayed signal of one neighbour inhibits the other. An
-        object moving opposite to the direction that the term detects reaches the inhibiting neighbour first. "none": no
+        object that moves in the other direction reaches this neighbour first, so the term is suppressed. "none": no
         detectors. Motion to the right gives positive output
     motion_ms: time constant of D [ms]
     frames: number of frames per action that environments render, a divisor of the number of physics steps per action.

@@ -151,8 +151,8 @@ def _range(range_nm: Any) -> tuple[float, float]:
 def _range_of(receptors: Receptors) -> tuple[float, float]:
     """Return the range (low, high) [nm] outside which every receptor type absorbs a negligible part of daylight.
 
-    The photons that a type absorbs below the range, and those above it, are each at most the fraction NEGLIGIBLE of all
-    the photons that it absorbs from a white surface in daylight.
+    For each receptor type, consider all photons that it absorbs from a white surface in daylight. At most the fraction
+    NEGLIGIBLE of them lies below the range, and at most this fraction above it.
     """
     nm = np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1)
     so_far = np.cumsum(receptors.catch(nm), axis=1)
@@ -193,8 +193,8 @@ def receptors_of(receptors: Any) -> Receptors:
     receptors: `Receptors`, a name such as "rgb" or "lms" (the keys of RECEPTORS), or a sequence of receptor types.
 
     Raises:
-        ValueError: a name is unknown (the message suggests a similar one, if any), or there are no types or invalid
-            ones.
+        ValueError: a name is unknown (the message suggests a similar one, if any), the sequence is empty, or a type is
+            invalid.
     """
     if isinstance(receptors, Receptors):
         return receptors

@@ -11,7 +11,7 @@ registered_env         classes of the environments with these ids
 batch_task_checker     check_batch_task: test of a batch task against the protocol
 animals                all agents of all worlds, learning or frozen
 senses                 observations of one agent
-eyes_of_kind           signals of one kind of an agent's eyes
+eyes_of_kind           signals of an agent's eyes of the same kind
 frame_choice           number of frames per action for receptors with dynamics
 renderers              renderers of all eyes
 observation            memory of past frames

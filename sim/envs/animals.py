@@ -121,9 +121,9 @@ class Animals:
         return [senses.launch(poses, None if everyone else worlds, fresh=True) for senses in self.seeing]
 
     def remember(self, seen: Sequence[Arrays], fresh: np.ndarray) -> list[Arrays]:
-        """Add frames to the memories, and return the learners' observations.
+        """Add frames to the memories, and return the observations of the learning agents.
 
-        seen: the frames, for each agent whose eyes are used, learners first
+        seen: the new frames, one entry for each agent whose eyes are used; learning agents come before frozen ones
         fresh: indices of the worlds whose episode has just begun
         """
         known = [senses.observation(frames, fresh) for senses, frames in zip(self.seeing, seen, strict=True)]

@@ -78,19 +78,19 @@ def make_vec_env(
 
     task: one of `sim.TASKS`, a user-defined `sim.Task` or `sim.BatchTask`, or a `sim.Encounter`. With a user task, only
         n_envs, seed, memory, mode, least_return, episode_steps and render_mode may be passed, because the task itself
-        defines the rest. The animals of an encounter learn a single policy, and therefore must have the same spaces.
-        Arrays then have one row for each animal of each world.
+        defines what the other arguments set. The animals of an encounter learn a single policy, and therefore must have
+        the same spaces. Arrays then have one row for each animal of each world.
     eyes: the agent's eyes: one `sim.Eyes`, or several kinds of eyes by name; None: the default, `sim.Eyes()`
     n_envs: number of worlds, 1 to 1,000,000
     seed: seed of episodes and noise, a whole number of at least 0; None: a random seed
     memory: number of frames in an observation, 1 to 1,000,000
     mode: "training", "evaluation" or "test". In evaluation of a built-in task, objects that the agent reached reappear
-        elsewhere, and the terms of the reward have the weights that define the fitness. "test" is an evaluation for
-        final results. It equals "evaluation", unless a user task uses other worlds in this mode.
-    rays_per_receptor: number of rays traced for each receptor; reflected light is then ignored. "auto": the rendering
-        settings (`sim.Fidelity`) that cost least among those whose error is small compared with the receptors' noise.
-        They include light that was reflected twice if this light changes signals noticeably.
-        `sim.choose_fidelity(world, eyes, bands="own")` returns the same settings.
+        elsewhere, and the reward has the weights by which fitness is defined. "test" is an evaluation for final
+        results. It equals "evaluation", unless a user task uses other worlds in this mode.
+    rays_per_receptor: number of rays traced for each receptor; with a number, reflected light is ignored. "auto": the
+        fastest rendering settings (`sim.Fidelity`) whose error is small compared with the receptors' noise. They
+        include light that was reflected twice if this light changes signals noticeably. The same settings are returned
+        by `sim.choose_fidelity(world, eyes, bands="own")`.
     fidelity: a complete `sim.Fidelity` instead of rays_per_receptor, or "auto", which has the same meaning as
         rays_per_receptor="auto". A `sim.Fidelity` may also be passed as rays_per_receptor.
     world_seed, mazes, course, layouts, wall_height: the layout that all worlds share, see `sim.build_world`
@@ -101,15 +101,15 @@ def make_vec_env(
     medium: water or air between surfaces and eyes: see `sim.build_world`
     vary: ranges of quantities that are drawn for each episode, see docs/tasks.md. With {"light": (low, high)}, each
         episode has its own light level, whose logarithm is distributed uniformly; 1 is full daylight.
-    auxiliary: any of "depth", "ids" and "flow": quantities that an observation contains for each receptor in addition
-        to its signal, see docs/tasks.md
+    auxiliary: one or several of "depth", "ids" and "flow": quantities that an observation contains for each receptor in
+        addition to its signal, see docs/tasks.md
     render_mode: content of the images that the environment renders for human viewers. "rgb_array": the agent from
         behind, or the model of a user task, in both cases with the fields of view of the eyes drawn into the image;
         "eyes": the signals of all eyes, side by side, with a row for each kind of eyes; None: no images
 
-    Physics uses the same number of threads as Dr.Jit, but at most one for each world. drjit.set_thread_count limits
-    both. A FidelityWarning states that the fidelity is less accurate than allowed. A MirrorWarning lists features of
-    the model that are not rendered.
+    Physics uses as many threads as Dr.Jit, but no more threads than there are worlds. drjit.set_thread_count limits the
+    threads of physics and of Dr.Jit. A FidelityWarning states that the fidelity is less accurate than allowed. A
+    MirrorWarning lists features of the model that are not rendered.
 
     Raises:
         ValueError: an argument is invalid, or has no effect for this task.
@@ -228,7 +228,7 @@ def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
 def _fidelity_of(
     rays_per_receptor: float | str | Fidelity, fidelity: Fidelity | str | None, eyes: Eyes | Mapping[str, Eyes]
 ) -> Fidelity | None:
-    """Return the fidelity that `rays_per_receptor` or `fidelity` specifies; None if it is chosen automatically."""
+    """Return the rendering settings that the arguments specify; None if they are to be chosen automatically."""
     chosen = isinstance(fidelity, str) and fidelity == AUTO
     if not (fidelity is None or chosen or isinstance(fidelity, Fidelity)):
         raise ValueError(f"fidelity = {shown(fidelity)}: must be a sim.Fidelity, {AUTO!r} or None")

@@ -20,7 +20,7 @@ DEPTH, IDS, FLOW = AUXILIARY
 
 
 class Auxiliary:
-    """Depth, geom id and optic flow for each receptor of all eyes of one kind, in all worlds.
+    """Depth, geom id and optic flow in all worlds, for each receptor of an agent's eyes of the same kind.
 
     Each value belongs to the point that is visible at the centre of the receptor.
 

@@ -20,7 +20,7 @@ SEED = 0
 def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
     """Play random actions in a few worlds, and compare the task's behaviour with the description of `sim.BatchTask`.
 
-    Nothing is rendered. Gymnasium's `check_env` does the same for environments.
+    Nothing is rendered. To check an environment, use Gymnasium's `check_env`.
 
     n_envs: number of worlds, 2 to 1,000,000
     steps: number of actions, 1 to 10⁹
@@ -29,8 +29,9 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
 
     - The task's settings are valid.
     - All arrays that its methods return have the right shapes, and `rewards`, `proprioception` and the outcome of an
-      overridden `judge` contain finite numbers. (In an environment, NaN in `rewards` ends the episode of the world.)
-    - `act` and `judge` name only worlds that exist.
+      overridden `judge` contain finite numbers. This check is stricter than an environment, where NaN in `rewards` ends
+      the episode of the world.
+    - `act` and `judge` return no indices of worlds that do not exist.
     - `reset` changes only the worlds that it was given.
     - A world's episode depends neither on other worlds nor on their number.
     - The same seed leads to the same episode.

@@ -111,7 +111,7 @@ def actions_of(name: str, actions: Any, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def one_worlds_action(name: str, action: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the action of the only world as a float32 array; the arguments are those of `actions_of`.
+    """Return the action for an environment of one world as a float32 array. For the arguments, see `actions_of`.
 
     Raises:
         ValueError: the action is not finite, or `actions_of` refuses it.

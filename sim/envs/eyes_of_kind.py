@@ -1,4 +1,4 @@
-"""Signals of those eyes of an agent that are of one kind, in all worlds, with noise and receptor dynamics."""
+"""Signals of an agent's eyes of the same kind, in all worlds, with noise and receptor dynamics."""
 
 from __future__ import annotations
 
@@ -79,9 +79,9 @@ class EyesOfKind:
         """Launch the rendering of the frame at the end of an action. The result is the receptors' response to it.
 
         Before that, this method renders the frames at earlier moments of the action, and the receptors respond to each
-        of them in turn. There are no earlier frames if these worlds begin an episode (`fresh`). If only some worlds are
-        rendered, and they do not begin an episode, the new frame replaces the frame that was last rendered in these
-        worlds.
+        of them in turn. There are no earlier frames if these worlds begin an episode (`fresh`). If `worlds` is given
+        and `fresh` is False, only the last frame of these worlds is rendered again. The receptors then return to their
+        state before that frame and respond to the new rendering.
         """
         light = self._simulation.light(self._wavelengths)
         first, chosen = fresh or worlds is not None, self._everyone if worlds is None else worlds
@@ -117,7 +117,7 @@ class EyesOfKind:
         return np.concatenate([drawn, np.zeros_like(drawn)], axis=2) if drawn.shape != shape else drawn
 
     def get_state(self) -> dict[str, np.ndarray]:
-        """Return all arrays on which future signals depend, apart from the state of the worlds."""
+        """Return all arrays, except the state of the worlds, on which future signals depend."""
         found = {"remembered": self.memory.frames_held, "noise": self._normals.place}
         return found if self._in_time is None else {**found, "receptors": self._in_time.state.copy()}
 

@@ -71,10 +71,10 @@ class _Field:
     share: np.ndarray
 
     def visible(self, reach: np.ndarray) -> np.ndarray:
-        """Return the mask of the pixels whose points no obstacle hides from the eye, (n,) bool.
+        """Return True for each pixel that shows a point visible from the eye, not hidden by an obstacle, (n,) bool.
 
-        reach: distance from the eye to the first obstacle along each of 64 rays, which are evenly spaced over its field
-            of view from right to left [m], (ray,); distances between rays are interpolated
+        reach: distance [m] from the eye to the first obstacle along each of 64 rays, which are evenly spaced over the
+            eye's field of view from right to left, (ray,); distances between rays are interpolated
         """
         end = np.diff(reach).take(self.ray)
         end *= self.share
@@ -199,7 +199,7 @@ def _fan(eyes: Eyes) -> np.ndarray:
 def _receptor_rays(eyes: Eyes) -> np.ndarray:
     """Return the azimuths [rad] of receptor columns, (column,), see `Eyes.column_azimuths`.
 
-    If there are more than 15 columns, only every second, third, ... column is included.
+    If there are more than 15 columns, only every k-th is included, with the smallest k that leaves at most 15.
     """
     columns = eyes.resolution[1]
     return eyes.column_azimuths()[:: -(-columns // MOST_RAYS)]

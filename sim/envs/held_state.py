@@ -15,8 +15,8 @@ from sim.scene.poses import world_indices
 def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
     """Return a stored state, after checking that it has the same entries and shapes as the current state `like`.
 
-    If there is only one world, the entry of its model is optional, because a single world gets its own model only when
-    a task changes it.
+    If there is only one world, the entry with the worlds' models is optional, because this entry exists only after a
+    task has changed the model of the world.
 
     Raises:
         ValueError: the state has other entries, or an entry of another shape.

@@ -20,11 +20,11 @@ ALONE = 0.05  # choice: radius [rad] of the hexagon of a single ommatidium
 def hexagon_map(frame: np.ndarray, eye: CompoundEye) -> np.ndarray:
     """Return an sRGB image (y, x, 3) uint8 of the signals of a compound eye, with one map per mount.
 
-    Each map is Hammer's equal-area projection of the sphere: ahead is in the middle, left is on the left, and up is at
-    the top. A map shows the part of the sphere that has ommatidia. A pixel has the colour of the ommatidium with the
-    nearest direction, which gives hexagons on a hexagonal lattice. Pixels at the edges of hexagons and around the eye's
-    field are grey. Each receptor type is shown in the same colour as in `retina_images.side_by_side`. A white surface
-    in full daylight is shown as white.
+    A mount is a position and direction of the eye on the animal. Each map is Hammer's equal-area projection of the
+    sphere: ahead is in the middle, left is on the left, and up is at the top. A map shows the part of the sphere that
+    has ommatidia. A pixel has the colour of the ommatidium with the nearest direction, which gives hexagons on a
+    hexagonal lattice. Pixels at the edges of hexagons and around the eye's field are grey. Each receptor type is shown
+    in the same colour as in `retina_images.side_by_side`. A white surface in full daylight is shown as white.
 
     frame: signals of the ommatidia of all mounts, one mount after the other, (ommatidium, channel)
     """
@@ -37,7 +37,7 @@ def hexagon_map(frame: np.ndarray, eye: CompoundEye) -> np.ndarray:
 
 
 def _palette(eye: CompoundEye) -> np.ndarray:
-    """Return the linear sRGB colour of a signal of 1, for each signal of an eye, (ommatidium, channel, 3)."""
+    """Return the linear sRGB colour that shows a signal of 1, for each receptor of an eye, (ommatidium, channel, 3)."""
     hues = hues_of(eye.receptors)
     types = np.arange(eye.channels)[None] if eye.types is None else eye.types
     mine = hues[types]
@@ -70,12 +70,14 @@ def _numbers(eye: CompoundEye) -> np.ndarray:
 
 
 def _margin(directions: np.ndarray, tree: KDTree, ways: np.ndarray, number: np.ndarray) -> np.ndarray:
-    """Return the distance of each pixel from the border between the directions of the two nearest ommatidia.
+    """Return the distance of each pixel's direction from the border between its two nearest ommatidia.
 
-    The unit is half of the distance between these two directions. The result is 1 at the direction of the nearest
+    The border consists of the directions that are equally far from the viewing directions of both ommatidia. The unit
+    is half of the distance between these two viewing directions. The result is 1 at the direction of the nearest
     ommatidium, and 0 on the border.
 
-    directions: directions of the ommatidia, unit vectors (n, 3), which `tree` contains
+    directions: viewing directions of the ommatidia, unit vectors (n, 3)
+    tree: tree of these directions, for searches
     ways: directions of the pixels, unit vectors (..., 3)
     number: index of the ommatidium nearest to each pixel, (...)
     """

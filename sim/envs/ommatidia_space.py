@@ -11,7 +11,7 @@ from optics.numerics.read_only import read_only
 
 
 class OmmatidiaBox(spaces.Box):
-    """A box of signals (memory, ommatidium, channel).
+    """Gymnasium space for the signals of a compound eye: a `Box` with the axes (frame in memory, ommatidium, channel).
 
     directions: viewing directions of the ommatidia, unit vectors (ommatidium, 3), see `CompoundEye.directions_on`
     """

@@ -1,7 +1,7 @@
 """A task prepared for several environments, so that expensive steps are done only once.
 
 The scenes are built, and a fidelity is chosen for each kind of eyes. A fidelity is the accuracy with which the world is
-rendered for them. For example, it contains the number of rays per receptor.
+rendered for these eyes. For example, it contains the number of rays per receptor.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ Fidelities = Mapping[str, Fidelity]  # fidelity of each kind of an agent's eyes,
 
 
 class PreparedTask:
-    """A task, its scenes, and the fidelity of all eyes: the accuracy with which the world is rendered for them.
+    """A task, its scenes, and the fidelity of all eyes: the accuracy with which the world is rendered for these eyes.
 
     task: the task
     fidelity: fidelity of the learners' eyes; None: the fidelities that the task defines, or an automatic choice
-    fidelities: for each agent, a dictionary with the fidelity of each kind of its eyes; None instead of the dictionary
-        if the agent's eyes are not used
+    fidelities: attribute, the resulting list with one entry per agent. The entry is a dictionary from the name of each
+        kind of the agent's eyes to its fidelity, or None if the agent's eyes are not used.
 
     Raises:
         ValueError: the task's settings, model or eyes are invalid.
@@ -89,7 +89,7 @@ class PreparedTask:
         return found
 
     def elsewhere(self, task: BatchTask) -> PreparedTask:
-        """Prepare `task`, which has the same eyes but another layout of the world; rendering is equally accurate."""
+        """Return `task` prepared with these fidelities; it has the same eyes, but another layout of the world."""
         found = copy.copy(self)
         found.task = task
         found._scenes = None if self._scenes is None or not isinstance(task, AgentTask) else scenes_for(task)

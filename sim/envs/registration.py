@@ -37,7 +37,7 @@ def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
 
     Raises:
         ValueError: `id_` is not text, `task` is not a `sim.Task`, or its `episode_steps` is invalid.
-        Error: the id has an invalid form. The class is `gymnasium.error.Error`.
+        Error: the id has an invalid form. This exception is a `gymnasium.error.Error`.
     """
     from optics.numerics.arguments import of_kind, shown, whole
     from sim.tasks.task import Task
@@ -52,7 +52,10 @@ def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
 
 
 def _register(id_: str, episode_steps: int, options: dict[str, Any]) -> None:
-    """Register an id. Callers of Gymnasium's functions can pass `max_episode_steps` for another length of episodes."""
+    """Register the Gymnasium id of a task.
+
+    Callers of Gymnasium's functions can pass `max_episode_steps` for another length of episodes.
+    """
     gymnasium.register(
         id_,
         entry_point="sim.envs.registered_env:RegisteredEnv",

@@ -34,7 +34,7 @@ class AgentRenderers:
 
 
 def scenes_for(task: AgentTask) -> dict[str, WorldScene]:
-    """Return a prepared scene of the task's world for each kind of the agent's eyes, by name of the kind."""
+    """Return scenes of the task's world, prepared for rendering: {name of a kind of the agent's eyes: its scene}."""
     kinds = task.eyes if isinstance(task.eyes, Mapping) else {EYES: task.eyes}
     return {name: WorldScene(task.world, eyes) for name, eyes in kinds.items() if eyes is not None}
 
@@ -77,7 +77,8 @@ def _of_agent(
 def _scene_of_model(simulation: Simulation, kind: EyeKind, fidelity: Fidelity) -> PreparedScene:
     """Return the simulation's model as a scene for one kind of eyes.
 
-    If samples are rays, Mitsuba traces all of them. If samples are areas, closed forms may replace ray tracing.
+    If light is sampled along rays, Mitsuba traces all of them. If light is sampled over areas of the visual field,
+    closed forms may replace ray tracing.
     """
     task, physics = simulation.task, simulation.physics
     return PreparedScene(

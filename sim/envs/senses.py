@@ -69,9 +69,10 @@ class Senses:
         return {name: sight.launch(poses, worlds, fresh) for name, sight in self.sights.items()}
 
     def update_auxiliary(self, poses: Poses, fresh: np.ndarray) -> None:
-        """Update the auxiliary entries of the observation.
+        """Update the auxiliary entries of the observation: depth, geom ids and optic flow, if the task requests them.
 
-        fresh: indices of the worlds whose episode has just begun. If there are any, only their entries are updated.
+        fresh: indices of the worlds whose episode has just begun. If there are any, only the entries of these worlds
+            are updated.
         """
         for auxiliary in self._auxiliary:
             for name, array in auxiliary.render(poses, fresh).items():
@@ -95,7 +96,7 @@ class Senses:
         return {**remembered, **self.other_entries(slice(None))}
 
     def preview(self, seen: Arrays, worlds: np.ndarray) -> Arrays:
-        """Return the memory that these worlds would have after the new frames, which are not stored.
+        """Return the memory as it would be in these worlds after the new frames, without storing these frames.
 
         seen: new frames of all worlds, by kind of eyes
         """

@@ -26,20 +26,20 @@ from sim.tasks.simulation import LEAST_RETURN, Simulation
 class EyesVecEnv(OneEnvironment):
     """Many worlds of one task.
 
-    In a `sim.Encounter`, all animals learn one policy, and have the same spaces. The rows of the first animal in all
-    worlds come first, followed by the rows of the second animal. Observations, rewards, endings and `info` are
-    documented in docs/tasks.md. When an episode ends, its world starts the next one automatically. The returned
-    observation is then the first observation of the new episode, and info["terminal_observation"] is the last
-    observation of the old episode. `reset_infos` contains the info of each episode's first observation. A world's
-    episodes depend only on the seed, the world's index and its actions. An exception in a `sim.Task` during an episode
-    ends it as a failure, whereas an exception in a `sim.BatchTask` is raised.
+    In a `sim.Encounter`, all animals learn one policy, and have equal observation and action spaces. The rows of the
+    first animal in all worlds come first, followed by those of the second animal. Observations, rewards, endings and
+    `info` are documented in docs/tasks.md. When an episode ends, its world starts the next one automatically. The
+    returned observation is then the first one of the new episode, and info["terminal_observation"] is the last one of
+    the old episode. `reset_infos` contains the info of each episode's first observation. The episodes of a world depend
+    only on the seed, the index of the world and the actions in it. An exception in a `sim.Task` during an episode ends
+    it as a failure, whereas an exception in a `sim.BatchTask` is raised.
 
-    simulation, renderers: the worlds, and renderers of every agent's eyes
+    simulation, renderers: the worlds, and for each agent the renderers of its eyes
     memory, render_mode: see `sim.make_vec_env`
-    failures: number of episodes that ended because of a failure, by reason
+    failures: attribute, for each reason of failure, the number of episodes that ended for this reason
 
     Raises:
-        ValueError: animals that learn a single policy have different spaces.
+        ValueError: animals that learn a single policy have different observation or action spaces.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class EyesVecEnv(OneEnvironment):
 
     @property
     def eyes(self) -> Any:
-        """Eyes of a built-in task's agent: a `sim.Eyes`, or a dictionary of them by name; None for other tasks."""
+        """Eyes of a built-in task's agent: a `sim.Eyes`, or a dictionary {name: `sim.Eyes`}; None for other tasks."""
         return getattr(self.simulation.task, "eyes", None)
 
     @property
@@ -263,7 +263,7 @@ class EyesVecEnv(OneEnvironment):
         return infos
 
     def _first_infos(self, worlds: np.ndarray) -> list[dict[str, Any]]:
-        """Return the infos of these worlds before the first action: one per world, learner after learner."""
+        """Return the infos before the first action: for each learner in turn, one info for each of these worlds."""
         simulation = self.simulation
         more = simulation.task.first_info(simulation.physics, worlds) or [{}] * len(worlds)
         return [

@@ -87,7 +87,7 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
         return observation, reward, done & ~truncated, done & truncated, last | self._together(infos)
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """Return an image (y, x, 3) uint8 of every world, as set by `render_mode`; None if this is None.
+        """Return an image (y, x, 3) uint8 of every world, as set by `render_mode`; None if `render_mode` is None.
 
         Raises:
             RuntimeError: `render_mode` is not None, and either there has been no reset yet or `close` has been called.

@@ -39,8 +39,8 @@ class WorldPictures:
     def taken(self) -> list[np.ndarray]:
         """Return images (y, x, 3) uint8, as selected by the render mode.
 
-        "rgb_array": one image of each world; "eyes": for each learner, one image per world, which shows its signals;
-        None: an empty list
+        "rgb_array": one image of each world; "eyes": for each learner in turn, one image of each world, which shows the
+        signals of the learner's eyes in this world; None: an empty list
         """
         if self._mode == "eyes":
             learners = self._animals.learners
@@ -85,7 +85,7 @@ class _ModelCameras:
         """Return the camera of a world: a common one, or one for each world if bodies differ between worlds.
 
         A world's camera is rebuilt only when the appearance of its bodies changes, because a new camera creates new
-        materials, and the kernels of all eyes must then be recorded again.
+        materials. Dr.Jit must then record the rendering kernels of all eyes again.
         """
         bodies = physics.bodies
         model = bodies.models[world]
@@ -109,7 +109,7 @@ class _ModelCameras:
 
 
 def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
-    """Return an image (y, x, 3) uint8 of each world, with a row for each kind of eyes."""
+    """Return an image (y, x, 3) uint8 of each world: pictures of an agent's kinds of eyes, one above another."""
     rows = [[_drawn(frame, sight.renderer.eye) for frame in sight.memory.newest] for sight in senses.sights.values()]
     return [one_above_another(pictures) for pictures in zip(*rows, strict=True)]
 

@@ -64,7 +64,7 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View], pixel_aspect:
     """Write views to an OpenEXR file, completely or not at all; an existing file is replaced.
 
     views: views with different names, one or more
-    pixel_aspect: width of a pixel divided by its height, with which viewers display the file
+    pixel_aspect: width of a pixel divided by its height; viewers display the file with this ratio
 
     Raises:
         ValueError: `path` is no path, pixel_aspect is not positive and finite, there are no views, `views` contains

@@ -1,4 +1,4 @@
-"""Previews of views, which are shown by plain viewers of EXR files: images in linear sRGB, (y, x, 3)."""
+"""Preview of a `View`, the image of one eye: linear sRGB (y, x, 3), for EXR viewers that show only R, G and B."""
 
 from __future__ import annotations
 

@@ -84,9 +84,13 @@ def fields_of_views(parts: Sequence[Any], stem: str) -> list[dict[str, Any]]:
 
 
 def _fields_of_view(channels: Mapping[str, np.ndarray], header: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """Return the fields of a `View` from one part of an OpenEXR file; {} if no channel (y, x) is spectral.
+    """Return arguments for the constructor of `View`, by name, from one part (sub-image) of an OpenEXR file.
 
-    Spectral channels of other quantities, such as reradiation, are left out with an `ExrWarning`.
+    The result is {} if no channel is spectral.
+
+    Spectral channels of quantities other than radiance and reflectance are left out with an `ExrWarning`.
+
+    channels: image in each channel, (y, x), by name of the channel
 
     Raises:
         ValueError: two channels of a quantity have the same wavelength, or radiance and reflectance have different
@@ -135,7 +139,7 @@ def _float32(plane: np.ndarray) -> np.ndarray:
 
 
 def _attributes(header: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the texts and numbers of a header that do not describe how pixels are stored."""
+    """Return the entries of an OpenEXR header that are text or numbers and do not describe how pixels are stored."""
     return {key: value for key, value in header.items() if key not in _OF_STORAGE and type(value) in (str, int, float)}
 
 

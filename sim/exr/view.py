@@ -1,4 +1,4 @@
-"""Image of one eye: spectral radiance or reflectance, and signals."""
+"""Image that one eye sees: spectral radiance or reflectance, and signals of receptors."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sim.eyes.compound_eye import CompoundEye
 
 @dataclass(frozen=True)
 class View:
-    """Image of one eye.
+    """Image that one eye sees.
 
     name: name of the eye, such as "left"
     wavelengths_nm: wavelengths of the bands of radiance and reflectance [nm], (band,)
@@ -111,5 +111,5 @@ def _shape(image: Any) -> tuple[int, ...]:
 
 
 def _kind(image: Any) -> str:
-    """Return the words of a message that state the shape of an array, or the value of another object."""
+    """Return words for an error message: the shape of an array, or the value of an object that is no array."""
     return f"has shape {_shape(image)}" if hasattr(image, "shape") else f"is {shown(image)}"

@@ -4,7 +4,7 @@ eyes                 Eyes: the eyes of the built-in agent
 sampling             samples of an eye's visual field: rays or rectangular areas
 tangent_plane        receptors on the visual field's tangent plane: size, directions and subdivision
 sensor               directions and weights of the samples
-receptive_fields     receptive fields behind a pupil, and random directions drawn from their mean
+receptive_fields     receptive fields behind a pupil, and ray directions whose density is the mean of these fields
 varied_fields        receptive fields of receptors of different sizes behind a pupil
 field_areas          rectangles of the visual field, and the fraction of each receptive field in them
 receptor_sums        weighted sums over samples for each receptor

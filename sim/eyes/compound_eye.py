@@ -103,8 +103,8 @@ class CompoundEye:
     def with_mirror_image(self) -> CompoundEye:
         """Return this eye together with its mirror image on the other side of the body.
 
-        The ommatidia of this eye come first, followed by their mirror images in the same order. The new eye has no
-        `rows`.
+        The ommatidia of this eye come first, followed by their mirror images in the same order. The attribute `rows` of
+        the new eye is None.
 
         Raises:
             ValueError: an ommatidium overlaps a mirror image, for example if it looks straight ahead.
@@ -148,7 +148,7 @@ class CompoundEye:
 
     @property
     def fov_deg(self) -> float:
-        """Horizontal angle [degrees] with its middle straight ahead that contains all viewing directions, up to 360."""
+        """Horizontal field of view [degrees], up to 360: twice the largest azimuth of a direction, left or right."""
         return float(2 * np.degrees(np.abs(np.arctan2(self.directions[:, 1], self.directions[:, 0])).max()))
 
     @property
@@ -160,7 +160,7 @@ class CompoundEye:
 
     @cached_property
     def kinds(self) -> tuple[tuple[optics.Ommatidium, ...], np.ndarray]:
-        """Distinct objects of `ommatidium`, and for each direction the index of its ommatidium among them, (n,)."""
+        """The distinct `optics.Ommatidium` objects of the eye, and for each direction the index of its object, (n,)."""
         if isinstance(self.ommatidium, optics.Ommatidium):
             return (self.ommatidium,), np.zeros(len(self), int)
         numbers: dict[optics.Ommatidium, int] = {}
@@ -192,7 +192,8 @@ class CompoundEye:
     def white(self) -> np.ndarray:
         """Acceptance of white light by each receptor type [sr], (type, ommatidium).
 
-        It is Σ_b weights[type, b] daylight_b Ω_b, with Ω_b of `solid_angles`.
+        It is Σ_b weights[type, b] daylight_b Ω_b. Ω_b is the integral of an ommatidium's acceptance function in band b,
+        see `solid_angles`.
         """
         bands = self.spectral_bands
         found: np.ndarray = (bands.weights * daylight(bands.wavelengths)) @ self.solid_angles.T
@@ -203,7 +204,7 @@ class CompoundEye:
         """Photons that a receptor absorbs in its integration time if its signal is 1, (channel, ommatidium).
 
         It is None without a photon budget. The number is proportional to the étendue: the facet's area times the
-        acceptance of white light.
+        integral of the acceptance function for white light, see `white`.
         """
         if self.photon_budget is None:
             return None
@@ -244,7 +245,10 @@ class CompoundEye:
         return read_only(given.astype(int))
 
     def _refuse_overlap(self) -> None:
-        """Refuse equal directions and, on a surface with a radius, facets closer than the mean of their diameters."""
+        """Raise a ValueError if two directions are equal or two facets overlap.
+
+        Facets can overlap only if `radius` is given. They do if they are closer than the mean of their diameters.
+        """
         from scipy.spatial import KDTree
 
         if len(self) == 1:
@@ -263,7 +267,11 @@ class CompoundEye:
         self._refuse_pairs(tree.query_pairs(float(sizes.max()), output_type="ndarray"), sizes)
 
     def _refuse_pairs(self, pairs: np.ndarray, sizes: np.ndarray) -> None:
-        """Refuse pairs (n, 2) of facets closer than the pair's mean size. sizes: of all facets [rad], (ommatidium,)."""
+        """Raise a ValueError if the two facets of a pair are closer than the mean of their sizes.
+
+        pairs: indices of two facets each, (pair, 2)
+        sizes: sizes of all facets [rad], (ommatidium,)
+        """
         pairs = pairs[pairs[:, 0] != pairs[:, 1]]
         chords = np.linalg.norm(self.directions[pairs[:, 0]] - self.directions[pairs[:, 1]], axis=1)
         close = np.flatnonzero(chords < sizes[pairs].mean(axis=1))

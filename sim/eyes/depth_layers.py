@@ -14,8 +14,8 @@ from optics.numerics.autodiff import Array
 class DepthLayers:
     """Distances z for which an eye has a PSF. They are evenly spaced in 1/z, because defocus is linear in 1/z.
 
-    Light from a distance between two layers is divided between the two, linearly in 1/z. Light from beyond the first or
-    last layer is attributed to that layer.
+    Light from a distance between two layers is divided between the two, linearly in 1/z. Light from beyond the farthest
+    layer is attributed to the farthest layer, and light from in front of the nearest layer to the nearest one.
 
     farthest, nearest: distances [m]; farthest may be infinite
     count: number of layers; the inverse distance of a single layer is the mean of 1/farthest and 1/nearest

@@ -242,7 +242,7 @@ class Eyes:
 
     @property
     def fovy_deg(self) -> float:
-        """Vertical field of view of one eye [deg], also if `vertical_fov_deg` is None."""
+        """Vertical field of view of one eye [deg], derived from the horizontal one if `vertical_fov_deg` is None."""
         if self.ommatidium is not None:
             return lattice_fovy_deg(*self.resolution, self.fov_deg)
         if self.vertical_fov_deg is not None:
@@ -278,7 +278,7 @@ def _is_pupil(value: Any) -> bool:
 
 
 def eye_positions(azimuths: np.ndarray) -> np.ndarray:
-    """Return the pupil centres (n, 3) at azimuths [rad], (n,), in the agent's frame [m], on the body's equator."""
+    """Return centres (n, 3) [m] of pupils on the body's equator at azimuths (n,) [rad], in the agent's frame."""
     return BODY_RADIUS * np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros_like(azimuths)], axis=-1)
 
 

@@ -37,10 +37,10 @@ class FieldAreas:
     def from_fields(cls, fields: ReceptiveFields, parts: tuple[float, float], beyond: float = BEYOND) -> FieldAreas:
         """Divide each receptor's area into rows and columns, and add a rim of rectangles around the receptors.
 
-        At most the fraction `beyond` of the receptors' light comes from outside the rim on each side. With half a row
-        per receptor, each row covers two receptors, and the outermost rows may extend beyond the outermost receptors.
+        On each side, at most the fraction `beyond` of the light of all receptors comes from beyond the rim.
 
-        parts: numbers of rows and of columns per receptor, which may be smaller than 1
+        parts: numbers of rows and of columns per receptor, which may be smaller than 1. For example, if there is half a
+            row per receptor, each row covers two receptors. The outermost rows may then extend beyond the receptors.
         """
         found = []
         for axis, (n, per_receptor) in enumerate(zip(fields.resolution, parts, strict=True)):
@@ -94,14 +94,14 @@ def _within(n: int, per_receptor: float) -> int:
 
 
 def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float) -> int:
-    """Return how many rectangles to add to the visual field before the first receptor of a row or a column.
+    """Return the width of the rim before the first receptor of a row or a column, as a number of rectangles.
 
-    These rectangles form a rim, because receptive fields extend beyond the outermost receptors. Some of the light that
-    the receptors of the row or column receive comes from outside the rim. The result is the smallest number for which
-    the light from outside the rim is at most the fraction `beyond` of all light that these receptors receive.
+    The visual field is divided into rectangles. It includes a rim around the receptors, because receptive fields extend
+    beyond the outermost receptors. The result is the smallest number for which the light from outside the rim is at
+    most the fraction `beyond` of all light that the receptors of the row or column receive.
 
-    profile: fraction of a receptor's light that comes from each cell (part of its receptive field) along the row or
-        column, (cell,)
+    profile: fraction of a receptor's light that comes from each cell along the row or column, (cell,). Cells are the
+        equal parts into which the receptor's field is divided; they are independent of the rectangles.
     line: number of receptors in the row or column, and number of rectangles per receptor
     cells: number of cells along a receptor's side
     """
@@ -117,14 +117,14 @@ def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float
 
 
 def _shares(edges: np.ndarray, centre: float, size: int, cells: int) -> np.ndarray:
-    """Return how much of each cell of a receptive field lies in each rectangle, along a row or a column.
+    """Return the fraction of each cell's length that lies in each rectangle, as an array (rectangle, cell).
 
-    Cells are the equal parts into which the receptive field is divided. The result contains fractions of a cell's
-    length, as an array (rectangle, cell).
+    The rectangles divide the visual field, and the cells are the equal parts of one receptive field. Only one direction
+    is considered: along a row or along a column.
 
     edges: positions of the rectangles' edges, in units of a receptor's side, in increasing order, (rectangles + 1,)
-    centre: centre of the receptive field, in the same coordinate as the edges
-    size: number of cells along the receptive field, which may be longer than a receptor
+    centre: position of the receptive field's centre, in the same units and from the same origin as `edges`
+    size: number of cells along the receptive field; the field may be longer than a receptor
     cells: number of cells along a receptor's side
     """
     places = (edges - centre) * cells + size / 2

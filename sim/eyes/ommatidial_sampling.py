@@ -29,10 +29,10 @@ class OmmatidialSampling:
     An ommatidium's rays are spread over its field with a density that increases with the acceptance function. The
     weight of a ray is the integral of the acceptance function over the directions that are nearer to it than to any
     other ray. With 8 rays or more, weights are corrected so that the signals of two test scenes are exact in every
-    band. Equal ommatidia share 16 arrangements of rays. Each ommatidium has one of them, by a fixed pseudo-random
-    choice, so that the errors of neighbours are nearly independent.
+    band. For each distinct `optics.Ommatidium` object of the eye, there are 16 arrangements of rays. Each ommatidium
+    has one of them, by a fixed pseudo-random choice, so that the errors of neighbours are nearly independent.
 
-    depth: a single layer, because facets have a large depth of field
+    depth: a single depth layer, so blur does not depend on distance, because facets have a large depth of field
     """
 
     eye: CompoundEye
@@ -114,7 +114,7 @@ def _tests(places: np.ndarray, spread: float) -> np.ndarray:
     The light is uniform in the first scene, and a Gaussian of variance `spread` around the ommatidium's axis in the
     second.
 
-    places: the two components perpendicular to the ommatidium's axis of each direction (a unit vector), (direction, 2)
+    places: directions: the two components of each unit vector perpendicular to the ommatidium's axis, (direction, 2)
     """
     return np.stack([np.ones(len(places)), np.exp(-(places**2).sum(axis=-1) / (2 * spread))], axis=-1)
 

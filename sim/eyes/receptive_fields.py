@@ -32,7 +32,7 @@ class NoRaysError(ValueError):
 
 @dataclass(frozen=True)
 class Draw:
-    """Low-discrepancy directions of rays, drawn from the mean of receptive fields as a probability density.
+    """Low-discrepancy directions of rays. Their probability density is the mean of the receptive fields.
 
     points: points on the tangent plane, x right and y down, in units of a receptor's width and height, in order of y,
         (ray, 2)
@@ -52,9 +52,10 @@ class Draw:
 class ReceptiveFields:
     """Receptive fields of an eye, tabulated for cells: small rectangles into which the visual field is divided.
 
-    field: fraction of the pupil's power in each cell of one receptor's field, (plane, y, x). It contains one plane
-        (table) for each band of each depth layer. A plane is the PSF, rotated by 180° and convolved with the receptor's
-        area. If receptors are waveguides, a plane is a waveguide's acceptance of light from each cell.
+    field: fraction of the power entering the pupil that one receptor receives from each cell of its field, (plane, y,
+        x). It contains one plane (table) for each band of each depth layer. A plane is the PSF, rotated by 180° and
+        convolved with the receptor's area. If receptors are waveguides, a plane is a waveguide's acceptance of light
+        from each cell.
     density: probability of drawing a ray in each cell of the visual field: the mean of the fields of all receptors and
         planes, (Y, X)
     resolution: numbers of rows and columns of receptors
@@ -68,7 +69,9 @@ class ReceptiveFields:
 
     @classmethod
     def from_eye(cls, eye: optics.Eye, cells: int, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
-        """Tabulate the receptive fields of an eye, with this number of cells along a receptor's side.
+        """Tabulate the receptive fields of an eye.
+
+        cells: number of equal parts into which a receptor's side is divided; fields have one value for each part
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
@@ -79,7 +82,7 @@ class ReceptiveFields:
         return cls(field, _mixture(field, eye.resolution, cells, everyone), eye.resolution, cells)
 
     def drawn_for(self, receptors: np.ndarray) -> ReceptiveFields:
-        """Return a copy that draws rays only for these receptors: its `density` is the mean of their fields."""
+        """Return a copy that draws rays only for these receptors: the copy's `density` is the mean of these fields."""
         return replace(self, density=_mixture(self.field, self.resolution, self.cells, receptors))
 
     @property
@@ -128,9 +131,10 @@ class ReceptiveFields:
         return Draw(cells / self.cells - np.array(density.shape)[::-1] / (2 * self.cells), ys, xs)
 
     def weights(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """Return the weights of rays in the signals of some receptors (numbered row by row), (plane, receptor, ray).
+        """Return the weight of each ray in the signal of each of these receptors, (plane, receptor, ray).
 
         A plane contains the weights in one band of one depth layer. A receptor's weights in a plane sum to `power`.
+        Receptors are numbered row by row.
 
         Raises:
             NoRaysError: a receptor has no ray in its field.
@@ -166,9 +170,9 @@ class ReceptiveFields:
 def cells_per_receptor(resolution: tuple[int, int]) -> int:
     """Return the usual number of cells along a receptor's side, for eyes of this resolution (height, width).
 
-    A receptor's area is divided into equal parts, the cells, and receptive fields are tabulated for each cell. There
-    are at least 4 cells along a receptor's side, and at least 32 along a row or a column of receptors, whichever
-    contains more receptors. Some eyes need more cells, see `cells_for`.
+    Cells are equal parts of a receptor's area. Receptive fields are tabulated with one value for each cell. There are
+    at least 4 cells along a receptor's side, and at least 32 along the side of the eye's field that has more receptors.
+    Some eyes need more cells, see `cells_for`.
     """
     return max(4, -(-MIN_CELLS // max(resolution)))
 
@@ -176,10 +180,10 @@ def cells_per_receptor(resolution: tuple[int, int]) -> int:
 def kernels_of(eye: optics.Eye, cells: int, depth: DepthLayers) -> np.ndarray:
     """Return the kernel of each depth layer, rotated by 180°, (plane, y, x).
 
-    There is a plane for each band of each depth layer. y and x count cells, of which `cells` fit along a receptor's
-    side. If K is the kernel and L(v) the light from the position v in the visual field, the signal of the receptor at r
-    is the convolution Σ_v K(r - v) L(v). The weights of the light are therefore the kernel, rotated by 180° and centred
-    on the receptor.
+    There is a plane for each band of each depth layer. The axes y and x count cells. A receptor is `cells` cells wide
+    and high. If K is the kernel and L(v) the light from the position v in the visual field, the signal of the receptor
+    at r is the convolution Σ_v K(r - v) L(v). The weights of the light are therefore the kernel, rotated by 180° and
+    centred on the receptor.
     """
     return _as_wide([eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances])
 
@@ -187,7 +191,7 @@ def kernels_of(eye: optics.Eye, cells: int, depth: DepthLayers) -> np.ndarray:
 def cells_for(eye: optics.Eye) -> int:
     """Return the number of cells along the side of an eye's average receptor.
 
-    This receptor's area is divided into equal parts, the cells, and receptive fields are tabulated for each cell. The
+    Cells are equal parts of this receptor's area. Receptive fields are tabulated with one value for each cell. The
     usual number is the result of `cells_per_receptor`. Eyes with narrow waveguides, or with receptors much smaller than
     the average, need more cells, but have at most 64.
     """
@@ -227,8 +231,8 @@ def receptive_fields_of(
 def low_discrepancy(n: int) -> np.ndarray:
     """Return n low-discrepancy points in the unit square, (n, 2).
 
-    They are the Hammersley set, shifted to the centres of the strata. Its coordinates are i/n and van der Corput's
-    sequence in base 2.
+    The coordinates in the Hammersley set are i/n and van der Corput's sequence in base 2. Here, each coordinate is
+    increased by half the distance between its adjacent values.
     """
     first_dyadic = 2.0 ** -np.ceil(np.log2(max(n, 2)))
     return np.stack([(np.arange(n) + 0.5) / n, van_der_corput(n, 2) + first_dyadic / 2], axis=-1)

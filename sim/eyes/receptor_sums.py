@@ -1,11 +1,12 @@
-"""Weighted sums over samples for each receptor, as one matrix product per row of receptors.
+"""Signals of receptors as weighted sums over samples (rays or areas), by one matrix product per row of receptors.
 
-Rays are ordered by their height in the visual field, so each row of receptors uses a contiguous range of rays. Narrow
-receptive fields have short ranges. A view is one eye in one world.
+Samples are called rays below. Rays are ordered by their height in the visual field, so each row of receptors uses a
+contiguous range of rays. Narrow receptive fields have short ranges. A view is one eye in one world.
 
 Light may be traced as a few spectral components (`sim.tracing.closed_form_tracer`). The light in each band is then a
 weighted sum of these components, and each channel of the signals is a weighted sum of bands. If it is cheaper, the
-receptors' weights are multiplied by both kinds of weights in advance (`of_components`).
+weights of rays in receptors' signals are multiplied in advance by the weights of components and of bands
+(`of_components`).
 """
 
 from __future__ import annotations
@@ -65,12 +66,12 @@ class Stretch:
 
 @dataclass(frozen=True)
 class RowProduct:
-    """Matrix products, one per row of receptors, that compute signals from the radiance along each ray.
+    """Matrix products that compute signals from the radiance along each ray. Each row of receptors has one product.
 
     signal[view, channel, i, j] is the sum over all rays of radiance[view, ray] W[channel, receptor (i, j), ray]. A view
     is one eye in one world.
 
-    stretches: the rays of each row of receptors
+    stretches: for each row of receptors, the contiguous range of rays that its signals depend on, with their weights
     channels: number of channels
     width: number of receptors in a row
     """
@@ -107,10 +108,10 @@ def _views_at_once(weights: int) -> int:
     """Return the number of views for which one matrix product computes the signals; a view is one eye in one world.
 
     The result is the largest of 32, 16, 8 and 4 for which OpenBLAS certainly computes the product on one thread. If
-    even the product for 4 views may use several threads, the result is 32, because products with so many weights are
-    large enough for several threads.
+    even the product for 4 views may use several threads, the result is 32. Such a product is large enough to be worth
+    several threads.
 
-    weights: number of weights of all receptors in one row, in all channels
+    weights: number of weights in the product for one row of receptors: rays times receptors times channels
     """
     return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights <= ONE_THREAD), BLOCK)
 
@@ -141,9 +142,10 @@ def of_receptors(factors: np.ndarray) -> ReceptorSums:
 def of_components(
     weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int], mixing: np.ndarray, basis: np.ndarray
 ) -> ReceptorSums:
-    """Return the function that maps light along rays to signals by one `RowProduct` per component.
+    """Return the function that maps light along rays to signals.
 
-    The weights of rays are multiplied in advance by `basis` and `mixing`, and summed over bands.
+    Light is given as spectral components. The function applies one `RowProduct` to each component, and adds the
+    results. The weights of rays are multiplied in advance by `basis` and `mixing`, and summed over bands.
 
     weights: weight of each ray in each receptor's signal, sparse matrices (receptor, ray), one for each band
     resolution: rows and columns of receptors
@@ -200,9 +202,9 @@ def within_stretches(
 ) -> tuple[scipy.sparse.csr_array, ...]:
     """Return weights (receptor, ray) per band, with 0 for the negligible rays at both ends of each row of receptors.
 
-    As many rays as possible are omitted at each end of a row. In every band, the omitted weights at one end may amount
-    to at most the fraction `share` / 2 of the sum of each receptor's weights. The remaining weights are then scaled so
-    that the sums are unchanged.
+    As many rays as possible are omitted at each end of a row. For every receptor and band, the omitted weights at one
+    end amount to at most the fraction `share` / 2 of this receptor's weights in this band. The remaining weights are
+    then scaled so that the sums are unchanged.
     """
     height, width = resolution
     rows: list[list[scipy.sparse.csr_array]] = [[] for _ in weights]

@@ -38,7 +38,7 @@ NEGLIGIBLE = 0.1
 
 @dataclass(frozen=True)
 class Trial:
-    """Rays or rectangular areas that sample the fields of some receptors, without the sensor of the whole eye.
+    """Rays or rectangular areas that sample the fields of only some of an eye's receptors.
 
     directions: directions of the rays, or centres of the areas on the tangent plane at distance 1, (ray, 3)
     bounce_samples: see `sim.eyes.sensor.BoxSensor`, (ray, 2)
@@ -79,7 +79,7 @@ class BoxSampling:
         return BoxSensor(*self._areas(count, in_rows, np.arange(np.prod(self.eye.resolution))))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """Return the same grids of rectangles as `areas`, but only for some receptors (numbered row by row)."""
+        """Return rectangles that fill some receptors (numbered row by row), arranged as by the method `areas`."""
         count = max(1, round(per_receptor))
         plane, unused, _, _, extent = self._areas(count, in_rows, receptors)
         return Trial(plane, unused, self._means(len(receptors), count), extent)
@@ -95,17 +95,15 @@ class BoxSampling:
         return plane, _unused(plane), count, self.depth, extent_of(self.eye, (1 / columns, 1 / rows))
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the samples of some receptors (numbered row by row), with this number of rays for each of them."""
+        """Return this number of rays for each of some receptors (numbered row by row), with their weights."""
         rays = max(1, round(rays_per_receptor))
         return Trial(*self._rays(rays, receptors), self._means(len(receptors), rays))
 
     def beyond_rim(self, rays: int) -> np.ndarray:
-        """Return directions of rays through a ring of squares around the visual field, (square * rays, 3).
+        """Return directions of `rays` rays through each square of a ring around the visual field, (square * rays, 3).
 
         The squares have the size of a receptor. One square is next to every receptor at the rim of the field, and one
         is at each corner. Squares are numbered row by row.
-
-        rays: number of rays through each square
         """
         rows, columns = (side + 2 for side in self.eye.resolution)
         row, column = np.nonzero(beyond_rim_of(self.eye.resolution))
@@ -114,7 +112,7 @@ class BoxSampling:
         return self._through((low_discrepancy(rays) + shifts) % 1.0 + corners)
 
     def _means(self, receptors: int, samples: int) -> np.ndarray:
-        """Return weights (band, receptor, sample) that give each receptor the mean of its own `samples` samples."""
+        """Return weights (band, receptor, sample) for the mean over a receptor's `samples` own rays or rectangles."""
         weights = np.kron(np.eye(receptors), np.full((1, samples), 1 / samples))
         return np.broadcast_to(weights, (self.eye.bands, *weights.shape))
 
@@ -130,7 +128,10 @@ class BoxSampling:
         return directions, ((bounce_samples(rays) + turns) % 1.0).reshape(-1, 2).astype(np.float32)
 
     def _through(self, points: np.ndarray) -> np.ndarray:
-        """Return directions towards points of the tangent plane (receptor, ray, 2) [receptor widths and heights]."""
+        """Return unit vectors (receptor * ray, 3) towards points of the tangent plane.
+
+        points: x right and y down, in receptor widths and heights, (receptor, ray, 2)
+        """
         return directions_of(self.eye, from_receptors(self.eye, points.reshape(-1, 2)))
 
     def _corners(self) -> np.ndarray:
@@ -150,8 +151,9 @@ class FieldSampling:
     The probability density of rays is the mean of all receptive fields. If the requested number leaves a receptor
     without a ray, `sensor` draws more rays until every receptor has one.
 
-    tolerance: allowed error of a signal, see `sim.eyes.allowed_error`. The lattice is so large that, in a white scene,
-        the receptors' mean signal changes by at most this error if the light from beyond one of its sides is omitted.
+    tolerance: allowed error of a signal, see `sim.eyes.allowed_error`. Rectangles around the receptors are added to the
+        lattice until, in a white scene, the light from beyond any one side of the lattice contributes at most this much
+        to the receptors' mean signal.
     """
 
     eye: optics.Eye
@@ -194,19 +196,16 @@ class FieldSampling:
         return ReceptiveFieldSensor(plane, _unused(plane), weights, self.eye.resolution, self.depth, extent)
 
     def may_share(self, per_receptor: float, *, in_rows: bool = True) -> bool:
-        """Return True if the rectangles of `areas` are so small that neighbouring receptors have different signals.
+        """Return True if the rectangles from the method `areas` are small enough to distinguish neighbouring receptors.
 
-        The width of a rectangle must be at most the width of a receptor, or at most half the width of a receptive
-        field. The same applies to the height.
+        A rectangle may be as wide as a receptor or as half of a receptive field, whichever is wider. The same applies
+        to the height.
         """
         sides = (1 / n for n in _parts_or_share(per_receptor, in_rows, aspect_of(self.eye)))
         return all(side <= max(1, width / 2) for side, width in zip(sides, self.fields.widths, strict=True))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """Return the same rectangles as `areas`, but only with their weights in the signals of the given receptors.
-
-        receptors: indices of the receptors, counted row by row
-        """
+        """Return the rectangles of `areas`, with their weights in some receptors' signals (numbered row by row)."""
         lattice = self._lattice(per_receptor, in_rows)
         plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
         return Trial(plane, _unused(plane), lattice.weights(self.fields, receptors), extent_of(self.eye, lattice.size))
@@ -239,8 +238,8 @@ class FieldSampling:
 def _parts_or_share(per_receptor: float, in_rows: bool, aspect: float) -> tuple[float, float]:
     """Return the number of rows, and the number of columns, of the rectangles that fill one receptor's area.
 
-    A `per_receptor` of 1 or more is rounded to a whole number. If it is below 1, several receptors share a rectangle:
-    with `in_rows`, both numbers are √`per_receptor`; otherwise, there are 1 row and `per_receptor` columns.
+    A `per_receptor` of 1 or more is rounded to a whole number. If it is below 1, a rectangle covers several receptors,
+    and the results are fractions: √`per_receptor` each with `in_rows`, otherwise 1 row and `per_receptor` columns.
 
     aspect: see `parts_of`
     """
@@ -250,7 +249,7 @@ def _parts_or_share(per_receptor: float, in_rows: bool, aspect: float) -> tuple[
 
 
 def _unused(plane: np.ndarray) -> np.ndarray:
-    """Return zeros (area, 2) as `bounce_samples`, which only rays need: they determine how a ray is reflected."""
+    """Return zeros (rectangle, 2) for `bounce_samples`: rectangles, unlike rays, need no directions of reflection."""
     return np.zeros((len(plane), 2), np.float32)
 
 
@@ -264,7 +263,7 @@ WorldSampling = EyeSampling | OmmatidialSampling
 
 
 def beyond_rim_of(resolution: tuple[int, int]) -> np.ndarray:
-    """Return a mask (height + 2, width + 2) that is True for the ring of squares around a field of receptors."""
+    """Return a mask that is True in a ring, one receptor wide, around a grid of receptors, (height + 2, width + 2)."""
     return np.pad(np.zeros(resolution, bool), 1, constant_values=True)
 
 

@@ -1,4 +1,4 @@
-"""Ray directions of an eye, and the weights of the light along these rays in the receptors' signals.
+"""Ray directions of an eye, and the weights with which light along these rays enters the receptors' signals.
 
 `sim.eyes.sampling` chooses the samples. All directions are fixed when the sensor is built, so that the same kernel
 renders every step.
@@ -74,7 +74,7 @@ class BoxSensor(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class ReceptiveFieldSensor(ReadOnlyArrays):
-    """Sensor of an eye behind a pupil, whose receptors and bands all use the same set of directions.
+    """Sensor of an eye with a pupil. All receptors, in all bands, use the same set of directions.
 
     The directions are drawn from the mixture of all receptive fields. In band b, the signal of receptor r is a
     weighted sum over rays p (self-normalised importance sampling):
@@ -120,8 +120,9 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         """Return the function that computes signals from the light along rays.
 
-        The argument of that function is the part of each spectral component that each depth layer receives, for each
-        view (one eye in one world) and ray, (layer * component, view, ray).
+        The argument of that function is the light along the rays, (layer * component, view, ray). The light in each
+        spectral component is divided between the depth layers, the distances for which the eye has a PSF. A view is one
+        eye in one world.
 
         mixing: weight of each band in each channel, (channel, band)
         basis: contribution of each component to each band, (component, band)
@@ -186,8 +187,8 @@ class OmmatidialSensor(ReadOnlyArrays):
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         """Return the function that computes signals from the light of each ommatidium.
 
-        The argument of that function is the weighted sum of each spectral component over the ommatidium's rays. The
-        components must be the bands.
+        The argument of that function is the weighted sum of each spectral component over the ommatidium's rays. Each
+        component must be the light in one band.
 
         mixing: weight of each band in each channel, (channel, band)
         basis: contribution of each component to each band, (component, band), the identity matrix

@@ -1,4 +1,4 @@
-"""Receptors on the tangent plane of an eye's visual field: their size, directions, and division into parts."""
+"""Receptors on the tangent plane of an eye's visual field: sizes, directions, and division of a receptor."""
 
 from __future__ import annotations
 
@@ -40,7 +40,9 @@ def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
 
 
 def on_tangent_plane(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
-    """Return points of the tangent plane as points in the eye's frame at distance 1 along its axis, (ray, 3).
+    """Convert points of the tangent plane to the eye's frame, (ray, 3).
+
+    The plane is perpendicular to the eye's axis, at the distance 1.
 
     plane: points, x to the right in average receptor widths, y down in average receptor heights, (ray, 2)
     """

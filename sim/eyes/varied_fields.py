@@ -51,17 +51,17 @@ class VariedFields(ReceptiveFields):
         return cls(field, density, eye.resolution, cells, eye.lattice)
 
     def drawn_for(self, receptors: np.ndarray) -> VariedFields:
-        """Return a copy that draws rays from the mean of these receptors' fields: this mean is its `density`."""
+        """Return a copy that draws rays only for these receptors: the copy's `density` is the mean of their fields."""
         return replace(self, density=_mixture(self.field, self.lattice, self.cells, receptors))
 
     def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
         """Return the weights with which light along each ray enters some receptors' signals, (plane, receptor, ray).
 
         A weight is the PSF, averaged over the receptor's rectangle. It applies to the light from one cell of the visual
-        field; a cell is as large as a small part of an average receptor. There is one plane for each band of each depth
+        field. Cells are squares, much smaller than an average receptor. There is one plane for each band of each depth
         layer. A depth layer is a distance for which the eye has a PSF.
 
-        draw: rays that `draw` has returned
+        draw: rays from the method `draw`
         receptors: indices of the receptors, counted row by row
         """
         rows, columns = np.divmod(receptors, self.resolution[1])
@@ -107,8 +107,8 @@ def _edges(edges: np.ndarray, receptors: int, cells: int) -> np.ndarray:
 def _at(table: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Interpolate a table linearly along its second axis, and return the values as an array (plane, position, x).
 
-    table: values, with one plane for each band of each depth layer, (plane, n + 1, x)
-    places: positions along the second axis, as indices with fractions, (position,)
+    table: values for each plane (one band of one depth layer of the eye), (plane, n + 1, x)
+    places: positions along the second axis; 2.5 is midway between the entries 2 and 3, (position,)
     """
     at = np.clip(places, 0, table.shape[1] - 1)
     k = np.minimum(at.astype(int), table.shape[1] - 2)
@@ -119,8 +119,8 @@ def _at(table: np.ndarray, places: np.ndarray) -> np.ndarray:
 def _across(table: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Interpolate a table linearly along its third axis, and return the values as an array (plane, receptor, ray).
 
-    table: values for each ray, with one plane for each band of each depth layer, (plane, ray, n + 1)
-    places: position along the third axis for each receptor and ray, as an index with fractions, (receptor, ray)
+    table: values for each plane (one band of one depth layer of the eye) and each ray, (plane, ray, n + 1)
+    places: positions along the third axis; 2.5 is midway between the entries 2 and 3, (receptor, ray)
     """
     at = np.clip(places, 0, table.shape[2] - 1)
     k = np.minimum(at.astype(int), table.shape[2] - 2)

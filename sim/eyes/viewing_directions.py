@@ -1,6 +1,7 @@
 """Viewing directions of ommatidia: hexagonal patches, whole heads, and measured directions.
 
-Directions are unit vectors (ahead, left, up) in the frame of a `sim.Mount` whose angles are all 0.
+Directions are unit vectors (ahead, left, up) in the frame of an eye whose `sim.Mount` has azimuth, elevation and
+roll 0.
 """
 
 from __future__ import annotations

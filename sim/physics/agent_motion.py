@@ -46,7 +46,7 @@ class Motion:
     def put(self, worlds: np.ndarray, motion: Motion) -> None:
         """Overwrite the motion in the worlds with these indices, in place.
 
-        Call this only before the object is returned to other code, because results are not meant to change.
+        Call this only on a new object that no other code has received yet: a returned `Motion` should not change.
         """
         for name, array in vars(self).items():
             array[worlds] = getattr(motion, name)
@@ -66,7 +66,7 @@ class Agents:
 
 
 class AgentPhysics:
-    """Batched physics of the agents in one world's model.
+    """Physics of many agents at once, each in its own copy of the same world.
 
     world: the world, whose model all agents share
     threads: number of threads for MuJoCo's batched step of 128 or more worlds
@@ -118,10 +118,11 @@ class AgentPhysics:
         return motion
 
     def _near(self, agents: Agents | WorldState, velocity: np.ndarray, in_reach: np.ndarray) -> Motion:
-        """Simulate agents that may touch something, each in a model of the geoms within its reach.
+        """Simulate agents that may touch something, each in a small model of the geoms within its reach.
 
-        An agent is simulated in the whole world instead if too many geoms are within reach, if a contact deflects it
-        towards other geoms, if the simulation breaks down, or if `local_contacts` is None.
+        An agent is simulated in the complete model of the world instead if the small model has no room for these geoms,
+        if a contact deflects the agent to within reach of another geom, or if the simulation breaks down. If
+        `local_contacts` is None, there are no small models, and all agents are simulated in the complete model.
 
         in_reach: obstacles within reach of each agent, (n, obstacle) bool
         """

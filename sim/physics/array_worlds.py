@@ -1,4 +1,4 @@
-"""Worlds of any MuJoCo model, with their states as arrays, for batch tasks."""
+"""Worlds of any MuJoCo model, with their states as arrays, for tasks that treat all worlds at once."""
 
 from __future__ import annotations
 
@@ -117,6 +117,6 @@ class ArrayWorlds(MujocoWorlds):
 
 
 def _parts() -> list[str]:
-    """Return the names of the single parts of a state, in MuJoCo's order."""
+    """Return the names of the parts of a MuJoCo state (such as "mjSTATE_QPOS"), in order, without combined parts."""
     kinds = {name: int(getattr(mujoco.mjtState, name)) for name in dir(mujoco.mjtState) if name.startswith("mjSTATE_")}
     return sorted((name for name, bits in kinds.items() if bits.bit_count() == 1), key=lambda name: kinds[name])

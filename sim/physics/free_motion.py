@@ -35,7 +35,7 @@ class FreeMotion:
     lower, upper: axis-aligned bounding boxes of the obstacles in the horizontal plane (n, 2) [m]
     reach: largest distance between the agent's centre and an obstacle's box at which the agent may touch the obstacle
         [m]
-    strongest: largest component of a command for which the response was tested to be linear [m/s]
+    strongest: magnitude of a command's components [m/s]; tests showed that the response is linear up to this magnitude
     """
 
     response: np.ndarray

@@ -30,7 +30,7 @@ class LocalContacts:
 
     whole: the world's complete model
     alone: the model of the agent without the walls and objects of its world (`sim.worlds.agent_model`)
-    free_motion: obstacles that the agent can touch, and the largest distance at which it may touch one
+    free_motion: the obstacles, and the largest distance of the agent's centre from an obstacle when the two may touch
     threads: number of threads for MuJoCo's batched step of 128 or more worlds
     """
 
@@ -47,10 +47,10 @@ class LocalContacts:
         self._step = BatchedStep(self._alone, threads)
 
     def few(self, in_reach: np.ndarray) -> np.ndarray:
-        """Return True for the obstacles in the small model in which each agent is simulated, (agent, obstacle) bool.
+        """Return the mask of the obstacles that each agent's small model contains, (agent, obstacle) bool.
 
-        The small model contains the agent and all obstacles within its reach. However, it has room for only 4 obstacles
-        (`sim.worlds.agent_model.ROOM`). If more are within reach, it contains none.
+        Each agent is simulated in a small model, which contains only the agent and all obstacles within its reach. The
+        model has room for only 4 obstacles (`sim.worlds.agent_model.ROOM`). If more are within reach, it contains none.
 
         in_reach: True for the obstacles within reach of each agent, (agent, obstacle) bool
         """
@@ -74,8 +74,9 @@ class LocalContacts:
     def strayed(self, position: np.ndarray, path: np.ndarray, few: np.ndarray) -> np.ndarray:
         """Return whether each agent came within reach of an obstacle that its small model lacks, (n,) bool.
 
-        The small model, in which the agent is simulated, contains only the obstacles that it would reach without
-        contacts. One of these may deflect the agent towards another obstacle.
+        The agent is simulated in a small model. Of the obstacles, this model contains only those that would be within
+        reach on the path that the agent takes if it touches nothing. One of these may deflect the agent towards another
+        obstacle.
 
         position: positions at the beginning (n, 2) [m]
         path: positions after each substep, relative to `position` (n, substep, 2) [m]

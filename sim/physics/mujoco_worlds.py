@@ -35,7 +35,7 @@ class MujocoWorlds:
     substeps: physics steps per action, 1 to 10⁹
     variation: ranges of quantities that differ between episodes; None: there are none
     datas: attribute, mjData of every world
-    bodies: attribute, models of the worlds: one that all worlds share, or one for each world
+    bodies: attribute, object that holds one model (mjModel) for all worlds together, or one for each world
 
     Raises:
         ValueError: an argument has the wrong type or is out of range, or `variation` names an object that the model
@@ -161,10 +161,10 @@ class MujocoWorlds:
         mujoco.mj_forward(data.model, data)
 
     def _pass_frame(self, world: int) -> None:
-        """Advance a world to the next moment before the end of an action at which its poses are recorded.
+        """Advance a world to the next moment within an action; its poses are recorded at this moment.
 
-        Receptors with dynamics see the world at these moments. After the last step, only the poses that follow from the
-        new state are computed, so recording them does not change the physics.
+        Receptors with dynamics see the world at these moments. After MuJoCo's steps, this method computes the poses
+        that follow from the new state. It leaves the state itself unchanged and so does not affect the physics.
         """
         data = self.datas[world]
         mujoco.mj_step(data.model, data, self.substeps // self.frames)
@@ -193,7 +193,7 @@ def _broken(data: mujoco.MjData) -> str | None:
 
 
 def _has_place(data: mujoco.MjData) -> bool:
-    """Return whether all visible poses are finite."""
+    """Return whether the positions and rotations of all bodies, and the positions of all geoms, are finite."""
     # NaN and infinity propagate through sums, and testing one sum is cheaper than testing every term.
     total = np.add.reduce
     return math.isfinite(total(data.xpos, None) + total(data.xmat, None) + total(data.geom_xpos, None))

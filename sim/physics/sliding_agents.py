@@ -28,9 +28,9 @@ UNSTABLE = "unstable physics"
 class SlidingAgents:
     """`n` worlds of one layout. Each has an agent on two slide joints, and objects that collide with nothing.
 
-    `sim.Physics` describes the methods that have no description in this class. In contrast to the description there,
-    `step` moves all worlds, also those in its argument `skipped`. Methods that need the state raise a RuntimeError
-    before the first call of `place`, and so does `step` before the first call of `move_objects`.
+    `sim.Physics` describes the methods that have no description in this class. However, `step(skipped)` of
+    this class also moves the skipped worlds. Methods that need the state raise a RuntimeError before the first call of
+    `place`, and so does `step` before the first call of `move_objects`.
 
     world: layout, model and starting positions
     n: number of worlds, 1 to 1,000,000
@@ -124,7 +124,7 @@ class SlidingAgents:
         self._command = actions
 
     def move_objects(self, objects: np.ndarray, courses: np.ndarray) -> None:
-        """Set the positions of the objects after the next step [m], (n, k, 3), and their headings [rad], (n, k).
+        """Set where the objects will be after the next step: positions [m], (n, k, 3), and headings [rad], (n, k).
 
         Call this method before the first `step`. Later steps without another call leave the objects at these positions.
         """

@@ -42,7 +42,8 @@ def varied_appearances(model: mujoco.MjModel, n: int, variation: Variation) -> V
     """Return the varied appearances; None if only light varies.
 
     Raises:
-        ValueError: `variation` names an object that the model lacks or that cannot vary, or a starting position varies.
+        ValueError: `variation` names an object that the model lacks or that cannot vary. Or it varies a starting
+            position, but the task itself places the agent and the objects.
     """
     if starts := variation.of_things(START):
         raise ValueError(
@@ -54,8 +55,8 @@ def varied_appearances(model: mujoco.MjModel, n: int, variation: Variation) -> V
 def _weightless(model: mujoco.MjModel, thing: str, name: str) -> int:
     """Return the id of the geom `thing`, after checking that the geom's size may differ between worlds.
 
-    Only the renderers' models differ in size, and physics uses one model for all worlds, so no agent may touch the
-    geom.
+    The geom's size differs only in the models for rendering. Physics uses one model for all worlds, with one size, so
+    the geom must be one that agents cannot touch.
 
     name: name of the varied quantity, for error messages
 

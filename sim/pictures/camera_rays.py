@@ -50,11 +50,12 @@ _VIEW = 5  # rows of four floats: position, columns of the rotation, (tan(fovy /
 
 @dataclass(frozen=True)
 class RayLight:
-    """Light along rays, and the planes that they hit.
+    """Light along rays, and the tangent planes of the surfaces that the rays hit.
 
     linear: linear sRGB, not clipped, (3, ray)
-    plane: coefficients of the tangent plane at each hit point, (3, ray); 0 without a hit. Any ray of the image meets
-        this plane at 1 / depth = plane @ (across, above, 1) [1/m], see `plane_coordinates`.
+    plane: coefficients of the surface's tangent plane at each ray's hit point, (3, ray); 0 without a hit. A line of
+        sight with the slopes `across` (to the right) and `above` (up) per unit of depth, see `plane_coordinates`, meets
+        this tangent plane at 1 / depth = plane @ (across, above, 1) [1/m].
     """
 
     linear: np.ndarray
@@ -168,7 +169,7 @@ class CameraRays:
 
 
 def _through_inner_sides(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -> Array:
-    """Return the first hit of each ray, if rays pass through the inner sides of closed shapes.
+    """Return each ray's first hit after passing through all inner sides of closed shapes in front of it.
 
     si: first hits of the rays, including hits on inner sides
     closed: see `CameraInputs`

@@ -49,7 +49,8 @@ def _pixel(point: np.ndarray, view: Viewpoint, size: tuple[int, int], reach: flo
 
     point: position in the world [m], (3,)
     size: height and width of the image [pixels]
-    reach: length [m]; points that are less than 10⁻⁶ times `reach` in front of the camera count as behind it
+    reach: length of the drawn lines [m]; points that are less than 10⁻⁶ times `reach` in front of the camera count as
+        behind it
     """
     right, up, back = (point - view.position) @ view.rotation
     if -back < NEAREST * reach:

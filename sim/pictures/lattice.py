@@ -21,7 +21,7 @@ class Lattice:
 
     size: size of the image (height, width)
     pixels: indices of the subset's pixels in the image, (n,). First come every fifth pixel, row by row, and then the
-        border pixels that are adjacent to none of those.
+        border pixels that are not adjacent to any pixel of this first group.
     nearest: for each pixel of the image, the index in `pixels` of the subset's nearest pixel, (height · width,)
     pairs: pairs of pixels that are neighbours in the lattice, as indices in `pixels`, (2, m)
     """
@@ -50,11 +50,11 @@ class Lattice:
         return Lattice(size, pixels, nearest.ravel(), pairs)
 
     def between(self, differ: np.ndarray) -> np.ndarray:
-        """Return the indices of pixels outside the lattice that may lie on an edge.
+        """Return the indices of pixels that may lie on an edge and do not belong to the lattice.
 
-        The lattice consists of every fifth pixel, and of some pixels at the border. Consider the lattice pixel that is
-        nearest to a pixel outside the lattice. The pixel outside may lie on an edge if this lattice pixel differs in
-        colour from a neighbouring lattice pixel.
+        The lattice consists of every fifth pixel, and of some pixels at the border. A lattice pixel may be near an
+        edge if it differs in colour from a neighbour in the lattice. The result contains the pixels whose nearest
+        lattice pixel does so.
 
         differ: True for the pairs of neighbouring lattice pixels (`pairs`) whose colours differ, (pair,)
         """

@@ -25,9 +25,10 @@ from sim.scene.variant import variant as in_variant
 
 
 class MergedMirror(Mirror):
-    """A Mitsuba scene with copies of all bodies of a model, in the geom groups that MuJoCo shows by default (0 to 2).
+    """A Mitsuba scene with copies of the geoms of all bodies of a model.
 
-    Merged meshes are called "still_<n>", all other shapes "geom_<geom id>_<part>".
+    Only geoms of the groups that MuJoCo shows by default (0 to 2) are copied. Merged meshes are called
+    "still_<n>", all other shapes "geom_<geom id>_<part>".
 
     model, spectra: see `sim.mirror`
     closed: names of the shapes that are invisible to a camera inside them
@@ -53,7 +54,7 @@ class MergedMirror(Mirror):
 
     @property
     def near(self) -> float:
-        """Smallest distance from a camera, along its axis, at which surfaces are visible [m]."""
+        """Distance along a camera's axis up to which surfaces are invisible, the same for all cameras [m]."""
         return self._near()
 
     def face(self, view: Viewpoint) -> None:

@@ -134,7 +134,11 @@ def see_photograph(
 
 
 def _checked_depth(depth: Any, shape: tuple[int, ...], animal: str) -> np.ndarray:
-    """Return the distances [m] of all pixels, (y, x), from the argument `depth` of `see_photograph`; None: infinite.
+    """Return the distance of the scene along the eye's axis [m] at each pixel of a photograph, (y, x).
+
+    depth: argument of `see_photograph`: distance of each pixel, or one distance for all; None: all are infinite
+    shape: height and width of the photograph
+    animal: name of the animal
 
     Raises:
         ValueError: the eye is a compound eye and `depth` is not None, or `depth` has another shape, or a distance is
@@ -243,9 +247,11 @@ def _resized(linear: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 
 
 def _nearest(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return the distance (y, x) in the middle of each cell of a grid of this size (rows, columns).
+    """Return the distance of the scene in the middle of each cell of a grid of this size (rows, columns).
 
-    Means over cells would lie between the distances of two surfaces.
+    Means over cells are not used: in a cell that shows two surfaces, the mean lies between their distances.
+
+    depth: distance of the scene at each pixel, (y, x)
     """
     rows, columns = (
         ((np.arange(wanted) + 0.5) * known / wanted).astype(int)

@@ -33,10 +33,10 @@ _DISPLAYED = np.rint(255 * encode_srgb(np.arange(LEVELS) / (LEVELS - 1))).astype
 
 @dataclass(frozen=True)
 class QuickImage:
-    """An image, with the planes that its rays hit.
+    """An image, with the tangent planes of the surfaces in it.
 
     picture: sRGB, (y, x, 3) uint8
-    planes: planes that rays hit, see `RayLight`, (3, ray)
+    planes: three coefficients of the surface's tangent plane where each ray hits it, see `RayLight`, (3, ray)
     ray: index of a ray for each pixel, (pixel,). The ray passes through the pixel's middle or, if no such ray was
         traced, through the nearest pixel of a lattice, which consists of every fifth pixel (`Lattice`).
     fovy_deg: vertical field of view of the camera
@@ -87,8 +87,8 @@ class QuickCamera:
         camera: name or id of a camera of the model, or a Viewpoint
 
         Raises:
-            ValueError: the camera is unknown or no plain perspective, the image has less than one pixel, or
-                `Mirror.sync` refuses the data.
+            ValueError: the camera is unknown, or is not a perspective camera defined by `fovy`; the image has less than
+                one pixel; or `Mirror.sync` refuses the data.
         """
         return self.render(data, camera, width, height).picture
 

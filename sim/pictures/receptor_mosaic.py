@@ -63,8 +63,8 @@ class ReceptorMosaic:
     def image(self, photograph: np.ndarray | None = None, height: int = 600) -> np.ndarray:
         """Return an sRGB image (height, x, 3) uint8 of the receptors, to the right of the photograph if it is given.
 
-        Red, green and blue show the receptors with the longest, the middle and the shortest peaks. A single type is
-        shown as grey. Of two types, the one with the shorter peak is shown as green and blue.
+        Red, green and blue show the receptors with the longest, the middle and the shortest peak wavelengths. A
+        single type is shown as grey. Of two types, the one with the shorter peak wavelength is shown as green and blue.
 
         photograph: sRGB values in [0, 1], (y, x, 3).
         height: height of the image in pixels, 16 to 8192.

@@ -1,10 +1,10 @@
 """Rendering of all eyes in all worlds. Read one_ray first: the batched renderers compute the same values faster.
 
 one_ray             see: one world, one ray for each receptor
-eye_renderer        EyeRenderer: all eyes of all worlds of any scene as one wavefront
+eye_renderer        EyeRenderer: all eyes of all worlds of any scene, rendered together
 prepared_scene      PreparedScene: a model and its eyes, built once for choosing a fidelity and for rendering
-ray_kernel          kernel that traces one ray per lane and sums the light for each receptor
-area_kernel         kernel that computes the mean light in areas of the visual field
+ray_kernel          kernel that traces one ray per lane (parallel computation) and sums the light for each receptor
+area_kernel         kernel that computes the mean light in areas, rectangles of the visual field
 eye_rays            rays of upright eyes, and of eyes that may be anywhere
 edge_rays           adaptive edge sampling: many rays at edges, few in other places
 light_factors       factors by which the light of each world is multiplied
@@ -15,7 +15,7 @@ world_scene         WorldScene: a built-in world, prepared
 model_renderer      ModelRenderer: eyes mounted on any MuJoCo model
 renderable          check that a fidelity fits an eye
 reference_renderer  ReferenceRenderer: Mitsuba's integrators, slow
-fidelity            Fidelity: samples, bands, depth layers and light, and the reasons for them
+fidelity            Fidelity: how finely to render (samples, bands, depth layers and light), and the reasons
 fidelity_choice     cheapest: the cheapest fidelity whose error is small compared with receptor noise
 world_fidelity      choose_fidelity: fidelity of a built-in world
 fidelity_stages     choice of bands, depth layers and light for a built-in world

@@ -1,7 +1,7 @@
 """The kernel of area sampling, which computes the mean light in areas, rectangles of an eye's visual field.
 
 Areas form rows and columns, whose borders are straight. Results that several areas share are computed once, in
-advance: the light on the bodies of a world, and the walls in the directions of the borders between columns.
+advance: the light on the bodies of a world, and the face of a wall that is visible at each border between columns.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from sim.tracing.areas.patch import Area
 
 @dataclass(frozen=True)
 class BorderInputs:
-    """Borders between areas, with the horizontal directions in which they lie.
+    """Borders between columns of areas, with the horizontal directions from the eye to these borders.
 
     Areas are the rectangles into which an eye's visual field is divided. Areas in the same column share their left and
     right borders.
@@ -51,9 +51,10 @@ class AreaInputs(KernelInputs):
     The kernel computes the mean light in areas, the rectangles of an eye's visual field.
 
     extent: width and height of areas on the tangent plane
-    borders: directions to the borders that areas share; None: areas share no borders
-    places: indices of the points on the bodies of all worlds at which illumination is computed; None: bodies reflect no
-        light onto other surfaces
+    borders: directions to the borders between columns of areas; None: too few areas share borders for
+        computing them in advance to save work
+    places: indices of points on the bodies of all worlds; the kernel computes the illumination of each point; None:
+        bodies reflect no light onto other surfaces
     """
 
     extent: Array | None = None
@@ -107,10 +108,10 @@ class AreaKernel(RayKernel):
         )
 
     def layers(self, scenes: Any, frame: Frame, inputs: AreaInputs) -> list[Array]:  # type: ignore[override]
-        """Return the spectral components of the mean light in each area, for each depth layer.
+        """Return the spectral components of the mean light in each area, separately for each depth layer.
 
-        An area is a rectangle of an eye's visual field. The kernel has one lane (parallel computation) for each area of
-        each eye in each world.
+        An area is a rectangle of an eye's visual field. A depth layer is a distance for which the eye has a PSF. The
+        kernel has one lane (parallel computation) for each area of each eye in each world.
         """
         lit = self._lit(frame, inputs)
         lane = Lane.from_index(inputs.lanes, inputs.counts)
@@ -144,11 +145,10 @@ class AreaKernel(RayKernel):
     def _shared_border_faces(
         self, frame: Frame, inputs: AreaInputs, borders: BorderInputs, lane: Lane
     ) -> tuple[Array, Array]:
-        """Return two indices for each area: of the wall's face visible at its left border, and of that at its right
-        border.
+        """Return the index of the wall face visible at each area's left border, and the index at its right border.
 
-        An area is a rectangle of an eye's visual field. The face is the one that a horizontal ray from the eye towards
-        the border hits first.
+        An area is a rectangle of an eye's visual field. At each border, the visible face is the first face of a wall
+        that a horizontal ray from the eye towards the border hits.
 
         lane: the area for which each lane (parallel computation) of the kernel is responsible
         """

@@ -23,7 +23,7 @@ class BatchedRenderer(EyeRenderer):
 
     world: geometry, materials and lights, which all worlds share
     eyes: the eyes of every agent
-    n_envs: number of worlds in a state
+    n_envs: number of worlds that are rendered at once
     fidelity: accuracy of rendering: number and kind of samples (rays or areas), number of spectral bands, depth layers,
         and reflections of light. `Fidelity(4, bands=4)` traces 4 rays for each receptor in 4 bands. None: the result of
         `choose_fidelity(world, eyes, bands="own")`. It has the eyes' own bands, and is the cheapest fidelity whose
@@ -31,8 +31,8 @@ class BatchedRenderer(EyeRenderer):
     tracer: "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto": the closed
         form if the world has one. The tracer in use is in `.tracer.name`, and the reason for its choice in
         `.tracer.why`
-    brightest: attribute, the larger of two signals: that of a white surface that faces all directional lights at once,
-        and that of veiling light
+    brightest: attribute, the signal of a white surface that faces all directional lights at once, or the signal of
+        veiling light if that is larger
 
     Raises:
         ValueError: n_envs is below 1, the rays do not fit into memory, an argument has the wrong type, the world or the
@@ -76,9 +76,9 @@ class BatchedRenderer(EyeRenderer):
 def in_whole_rays(fidelity: Fidelity, eye: WorldEye) -> Fidelity:
     """Return the fidelity, with the number of samples per receptor rounded to a whole number of at least 1.
 
-    If receptors share their samples, return the fidelity unchanged. Receptors behind a pupil share rays. They share
-    areas (rectangles of the visual field, which are the other kind of samples) only if there are fewer areas than
-    receptors.
+    If receptors share their samples, return the fidelity unchanged. Samples are rays or areas, which are rectangles of
+    the visual field. In an eye with a pupil, receptors always share rays, but share areas only if there are fewer areas
+    than receptors.
     """
     asked = fidelity.rays_per_receptor
     if isinstance(eye, CompoundEye) or eye.pupil is None or (fidelity.samples == AREAS and asked >= 1):

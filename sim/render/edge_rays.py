@@ -55,11 +55,11 @@ class EdgeRays:
         self._first, self._along = kernel.inputs(first), kernel.inputs(fine.directions)
 
     def launch(self, launch: Launch) -> Callable[[], np.ndarray]:
-        """Start rendering, and return a function that waits for the sums of light over each receptor's rays.
+        """Start rendering, and return a function that waits for, and returns, each receptor's sums of light over rays.
 
-        Sums over more than 4 rays are multiplied by 4 and divided by the number of rays, so that all receptors are
-        comparable. The worlds must not change before the sums are read. The sums are a flat array (component, world,
-        eye, receptor).
+        A receptor has 4 rays or, if it sees an edge, more. A sum over more rays is scaled to 4 rays: it is multiplied
+        by 4 and divided by the number of rays. All receptors are then comparable. The worlds must not change before the
+        sums are read. The sums are a flat array (component, world, eye, receptor).
 
         launch: function that launches a `FrozenKernel` with its inputs, and returns a function that waits for the
             result
@@ -86,12 +86,12 @@ class EdgeRays:
     def _beside_edges(self, light: np.ndarray) -> np.ndarray:
         """Return a mask that is True for receptors whose signal differs strongly from that of a neighbour.
 
-        An edge between two surfaces may pass unnoticed between the first four rays of such a receptor. Each receptor
-        covers a square of the visual field. Further squares of this size lie just outside the field, and receptors at
-        its rim are also compared with them. The mask is a flat array (view, receptor).
+        Only four rays have been traced for each receptor, and an edge between two surfaces may pass unnoticed between
+        them. Each receptor covers a square of the visual field. Receptors at the rim of the visual field are also
+        compared with squares of the same size just outside it. The mask is a flat array (view, receptor).
 
-        light: sums of the light over the first four rays of each square, array (component, view, square). The squares
-            are those of the receptors, and those just outside the visual field
+        light: sums of the light over the four rays of each square, array (component, view, square). The squares are the
+            receptors' squares and the squares just outside the visual field
         """
         means = np.tensordot(np.array(self._signals), light, 1) / FIRST
         field = np.empty((*means.shape[:2], *self._beyond.shape), means.dtype)
@@ -106,13 +106,12 @@ class EdgeRays:
         return found[:, 1:-1, 1:-1].ravel()
 
     def _render_all(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
-        """Return the sums of light over the first four rays of each square, and the spread of the signals of these
-        rays.
+        """Return, for each square, the sums of light over its four rays, and how much the signals of these rays differ.
 
-        The squares are those of the receptors, and those just outside the visual field. The four rays test whether a
-        receptor sees an edge. There is one array of sums for each component of the light's spectrum. For one type of
-        receptor, the spread is the difference between the largest and the smallest signal of the four rays. The largest
-        spread of all types is returned.
+        Each receptor covers a square of the visual field. Squares of the same size just outside the visual field are
+        included. The four rays test whether a square contains an edge. There is one array of sums for each component of
+        the light's spectrum. The last array contains the difference between the largest and the smallest signal of the
+        four rays, for the type of receptor for which it is largest.
         """
         components = self._kernel.layers(scenes, frame, inputs)
         signals = [sum(w * c for w, c in zip(worth, components, strict=True)) for worth in self._signals]
@@ -147,8 +146,8 @@ def edges_pay(resolution: tuple[int, int], rays: float) -> bool:
 
     Adaptive edge sampling first traces four rays for every receptor, and for further squares of a receptor's size just
     beyond the rim of the retina. It then traces the full number of rays, but only for receptors that see an edge.
-    Return True if the first rays are at most half of the rays without adaptive sampling. If they are more, a few
-    receptors that see an edge may use up what is saved at the others.
+    Return True if the rays of the first step are at most half as many as all rays without adaptive sampling. If they
+    are more, a few receptors that see an edge may use up what is saved at the others.
 
     resolution: number of rows and of columns of receptors
     rays: number of rays per receptor without adaptive sampling

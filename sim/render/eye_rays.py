@@ -30,7 +30,7 @@ class Counts:
 
     @classmethod
     def from_numbers(cls, samples: int, eyes: int) -> Counts:
-        """Return the numbers of samples and eyes, copied to the device the device."""
+        """Return the numbers of samples and eyes, copied to the device."""
         return cls(Divisor.from_number(samples), Divisor.from_number(eyes))
 
 
@@ -96,8 +96,8 @@ class EyeRays(Protocol):
 
         The kernel calls this method, so all arguments and the result are Dr.Jit variables on the device.
 
-        rows: the return value of the method `array`, in rows of four floats. It contains the poses of all free eyes, or
-            the poses of the bodies of upright eyes
+        rows: the return value of the method `array`, in rows of four floats. It contains the pose of each eye or, if
+            the eyes stand upright on one body, the pose of this body in each world
         along: directions of the samples
         lane: the world, the eye and the sample of this ray
         samples: number of samples of an eye
@@ -145,7 +145,7 @@ class UprightEyes:
 
 
 class FreeEyes:
-    """Eyes that may be anywhere."""
+    """Eyes that may have any position and any orientation in the world."""
 
     def __init__(self, places: EyePlaces, n_envs: int) -> None:
         self._places = places

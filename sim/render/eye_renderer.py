@@ -53,7 +53,7 @@ class EyeRenderer:
     eye, mounts, model: the scene's eye, mounts and model
     sensor: the sampled directions
     tracer: the method of tracing rays, see `sim.tracing.tracer.Tracer`
-    brightest: larger signal of two: a white surface that faces all directional lights at once, and veiling light
+    brightest: signal of a white surface that faces all directional lights at once, or of veiling light if it is larger
 
     One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Further warnings name lamps
     with spectral lines for which the eye has too few bands.
@@ -103,7 +103,7 @@ class EyeRenderer:
 
     @property
     def _samples_per_receptor(self) -> float:
-        """Number of samples per receptor. Behind a pupil, it includes areas beyond the rim of the retina."""
+        """Number of samples per receptor. If the eye has a pupil, areas beyond the retina's rim are also counted."""
         return len(self.sensor.directions) / float(np.prod(self.eye.resolution))
 
     def _check_memory(self, n_envs: int, samples_per_receptor: float) -> None:
@@ -145,8 +145,8 @@ class EyeRenderer:
 
         Raises:
             ValueError: the number of worlds or `light` is wrong; the poses belong to another model, are not finite or
-                have not been computed yet; or geoms differ from the model that the argument `varied` of
-                `sim.ModelRenderer` does not name.
+                have not been computed yet; or a geom differs from the model, although the argument `varied` of
+                `sim.ModelRenderer` does not name it.
         """
         return self.launch(poses, light).wait()
 
@@ -186,8 +186,8 @@ class EyeRenderer:
     def receptor_radiance(self, poses: Placed) -> np.ndarray:
         """Return spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32.
 
-        The unit is chosen so that a white surface that faces a light with `diffuse` = 1 has the radiance 1 at 560 nm.
-        Its spectrum is that of D65. Errors: see `signals`.
+        The unit is the radiance at 560 nm of a white surface that faces a MuJoCo light whose `diffuse` is 1. Such a
+        light has the spectrum of D65. Errors: see `signals`.
         """
         bands, (height, width) = self.eye.bands, self.eye.resolution
         layers = self._components(self._launched(poses).wait())
@@ -223,7 +223,7 @@ class EyeRenderer:
         return self.labels.flow(poses, later)
 
     def brightest_in(self, light: np.ndarray) -> float:
-        """Return the attribute `brightest` for lights that are brighter by the factors `light`, array (band,)."""
+        """Return what the attribute `brightest` would be if all lights were multiplied by `light`, (band,)."""
         return float((self.eye.throughput * self.eye.spectral_bands.weights @ (self._white * light)).max())
 
     @property
@@ -249,14 +249,14 @@ class EyeRenderer:
 
     @property
     def recordings(self) -> int:
-        """Number of kernel recordings: one per kernel in use, or up to three per kernel if meshes move."""
+        """Number of times that Dr.Jit recorded kernels: once per kernel that ran, up to 3 times if meshes move."""
         edges = 0 if self._edges is None else self._edges.recordings
         labels = vars(self).get("labels")
         recorded = self._rays.n_recordings + self._sums.n_recordings + edges
         return recorded + (0 if labels is None else labels.recordings)
 
     def _launched(self, poses: Placed, frozen: Any = None) -> PendingFrame:
-        """Start the kernel `frozen` or, by default, the kernels that sum the light over each receptor's rays."""
+        """Start the recorded kernel `frozen`; None: the kernels that sum the light over each receptor's rays."""
         placed = self.scene.placed(poses)
         self.scene.check_poses(placed, self.n_envs)
 
@@ -287,7 +287,7 @@ class EyeRenderer:
 
     @cached_property
     def _has_components(self) -> bool:
-        """True if light is traced in components other than the bands."""
+        """True if light is traced in components of its spectrum that are not the spectral bands."""
         return not np.array_equal(self.tracer.basis, np.eye(self.eye.bands))
 
     @cached_property
@@ -296,5 +296,5 @@ class EyeRenderer:
         return self.sensor.receptor_sums(self._mixing, np.eye(self.eye.bands))
 
     def _components(self, found: np.ndarray) -> np.ndarray:
-        """Return a kernel's flat output as (layer, component, value). There is a value per ray or sum over rays."""
+        """Return a kernel's flat output as (layer, component, value); each ray, or sum over rays, has a value."""
         return found.reshape(self.sensor.depth.count, len(self.tracer.basis), -1)

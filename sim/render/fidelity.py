@@ -30,10 +30,10 @@ class Level:
 
     stage, level: names of the stage and of its chosen level, for example "light" and "bounce"
     why: reason for this choice
-    predicted_error: error of a signal that this level causes (root mean square); None if it is unknown. If the
-        eyes keep the number of bands that they were built with, the error in the stage "bands" is an upper bound, which
-        may exceed the tolerance. This bound is the largest error over all types of receptors and over several surfaces:
-        measured reflectances and, in a medium, white and black
+    predicted_error: root mean square error that this level causes in a signal; None if it is unknown. If the eyes keep
+        the number of bands that they were built with, the error in the stage "bands" is an upper bound, which may
+        exceed the tolerance. This bound is the largest error over all types of receptors and over several surfaces:
+        surfaces with measured reflectances and, in a medium, a white and a black surface
     """
 
     stage: str
@@ -54,13 +54,14 @@ class Fidelity:
     depth: distances for which the eye has a PSF
     light: "direct": light of lamps after one reflection; "bounce": also after two reflections; "all": after any number
         of reflections, with samples="areas" only
-    samples: "rays", "areas" or "edges". With "areas", each receptor's square is divided into rays_per_receptor
-        rectangles, and the mean light in each of them is computed in closed form. If the eye has a pupil, there are
-        also rectangles outside the retina, along its rim, and receptors share larger rectangles if rays_per_receptor is
-        below 1. Areas need a world of upright walls, a floor and spheres. "edges" is adaptive edge sampling. A receptor
-        has four rays. It has rays_per_receptor rays instead if the signals of the four differ, or if its signal differs
-        strongly from that of a neighbouring receptor. Adaptive edge sampling needs a perfect lens and direct light, and
-        is chosen automatically only for user models.
+    samples: "rays", "areas" or "edges". Each receptor covers a square of the visual field. With "areas", this square is
+        divided into rays_per_receptor rectangles, and the mean light in each of them is computed in closed form. If the
+        eye has a pupil, there are also rectangles outside the retina, along its rim, and receptors share larger
+        rectangles if rays_per_receptor is below 1. Areas need a world of upright walls, a floor and spheres. "edges" is
+        adaptive edge sampling. A receptor has four rays. It has rays_per_receptor rays instead if the signals of the
+        four differ, or if its signal differs strongly from that of a neighbouring receptor. Adaptive edge sampling
+        needs a perfect lens and direct light, and is chosen automatically only for the user's own MuJoCo models, not
+        for built-in worlds.
     frames: number of rendered frames per action, for receptors with `dynamics`: a divisor of the number of physics
         steps per action, at most 10⁶. None: environments choose the smallest number with which the error of the signals
         is allowed.

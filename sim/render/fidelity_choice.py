@@ -3,9 +3,9 @@
 By default, the allowed error is half of the receptors' noise. A brain could not distinguish such an error from the
 noise. Every stage has levels, ordered by cost. The cheapest level whose predicted error is allowed is chosen, and
 stored with the reason. The available levels and their errors depend on the kind of scene (`world_fidelity`,
-`model_fidelity`). The rule for choosing a level is the same for all scenes (`cheapest`). It is used in environments for
-which the user specifies no fidelity (`sim.envs.prepared_task`), and in user tasks whose setting `fidelity` is "auto"
-(`sim.tasks.task_fidelity`).
+`model_fidelity`). The rule for choosing a level is the same for all scenes (`cheapest`). A fidelity is chosen in this
+way in environments for which the user specifies no fidelity (`sim.envs.prepared_task`), and in user tasks whose setting
+`fidelity` is "auto" (`sim.tasks.task_fidelity`).
 """
 
 from __future__ import annotations
@@ -26,13 +26,14 @@ class FidelityWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Samples:
-    """The samples with which a view is rendered: their kind and number, with the predicted error.
+    """The kind and number of samples with which an eye's view is rendered, and the predicted error that they cause.
 
-    kind: "rays", "areas" or "edges" (adaptive edge sampling: more rays for receptors that see an edge)
+    kind: "rays", "areas" (rectangles of the visual field) or "edges" (rays, more of them for receptors that see an
+        edge)
     light: record of how many reflections of light are followed, with the error due to further reflections
     number: number of samples per receptor
-    level: the same kind and number as text for reports, with the predicted error and the reason for the choice
-    enough: True if the error due to the samples is at most the allowed one
+    level: record of the chosen kind and number as text for reports, with the predicted error and the reason
+    enough: True if the error due to the samples does not exceed the allowed error
     """
 
     kind: str
@@ -106,7 +107,7 @@ class Stages(Protocol):
     def bands(self) -> Level:
         """Return a record of the number of spectral bands, and of the error due to this number if the error is known.
 
-        There is no choice in this stage: the number is that of the eye.
+        The number of bands is not chosen: it is the number that the eye has.
         """
 
     def depth(self, allowed: float) -> tuple[DepthLayers, Level | None]:
@@ -116,7 +117,7 @@ class Stages(Protocol):
         """
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
-        """Return a record of how many reflections of light are followed, why, and the error due to all others."""
+        """Return a record of how many reflections of light are followed, the reason, and the error due to the rest."""
 
     def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
         """Return the kind and number of samples."""

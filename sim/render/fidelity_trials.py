@@ -1,8 +1,8 @@
 """Trial renderings of a world, which determine the errors of sampling methods before the renderer is built.
 
-A trial renders some of an eye's receptors and compares their signals with signals from many more rays. The errors of
-rays and areas are computed for random receptors and, if there are objects, also for receptors that see an object
-(`sim.render.populations`), the errors of depth layers only for random receptors. Seeds are fixed, so errors repeat.
+A trial renders some of an eye's receptors and compares their signals with signals from many more rays. The errors due
+to rays and areas are computed for random receptors and, if there are objects, also for receptors that see one
+(`sim.render.populations`). Errors due to depth layers are computed only for random receptors. Seeds are fixed.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class FidelityTrials:
     def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[float], float]:
         """Return a function that maps the number of areas per receptor to the root mean square error of signals.
 
-        The reference is computed with many random rays, whose noise is included. Objects count as in `errors`.
+        The reference has many random rays, whose noise adds to the error. With objects, the result is as in `errors`.
         """
         populations = self._populations(sampling)
         truths = [
@@ -128,7 +128,7 @@ class FidelityTrials:
         return error
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether receptors may share areas without losing the differences between neighbouring receptors."""
+        """Return whether neighbouring receptors still differ if they share areas of the visual field."""
         return self._scene.may_share(sampling, per_receptor)
 
     def areas_of_field(self, sampling: EyeSampling, per_receptor: float) -> float:
@@ -137,7 +137,7 @@ class FidelityTrials:
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
 
     def _truth(self, sampling: EyeSampling, receptors: np.ndarray) -> Trial:
-        """Return many rays for these receptors, as a trial whose signals are the reference for area sampling."""
+        """Return a trial with many rays for these receptors, whose signals are the reference for area sampling."""
         of_a_view = TRUE_RAYS // (VIEWS[1] // 2)
         if isinstance(sampling, BoxSampling):
             return sampling.trial(int(np.clip(of_a_view // len(receptors), *TRUE_AREA)), receptors)
@@ -147,7 +147,7 @@ class FidelityTrials:
         return own.trial(rays / np.prod(self._eyes.resolution), receptors)
 
     def reflected_more_often(self, sampling: EyeSampling) -> float:
-        """Return the root mean square of the signals due to more than two reflections, computed with area sampling."""
+        """Return the root mean square, over receptors and views, of the signals due to more than two reflections."""
         trial = self._scene.area_trial(sampling, 1, self._receptors)
         twice, all_ = (self._signals(trial, sampling.depth, light) for light in lighting.LEVELS[1:])
         return _rms(all_ - twice)
@@ -155,7 +155,7 @@ class FidelityTrials:
     def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
         """Return root mean squares of the signals due to the second reflection and to direct light.
 
-        Both are for random receptors or for receptors that see an object, whichever makes the first value larger.
+        Both are for the group with the larger first value: random receptors, or receptors that see an object.
 
         Raises:
             ValueError: light cannot be followed after the first reflection.
@@ -170,7 +170,7 @@ class FidelityTrials:
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
         """Return, for each n in `counts`, the root mean square error of signals with n depth layers.
 
-        The reference has the same rays and all `finest` layers. Each n must select evenly spaced ones of them.
+        The reference has the same rays and all layers in `finest`. The n layers are evenly spaced among these.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
@@ -196,12 +196,12 @@ class FidelityTrials:
     def _signals(
         self, trial: Trial, depth: DepthLayers, light: str, views: RandomViews | None = None, most: int = RAYS
     ) -> np.ndarray:
-        """Return signals (view, channel, receptor) in as many of the views as the number of rays allows.
+        """Return signals (view, channel, receptor) in the first views, as many as `most` allows.
 
         trial: samples (rays or areas), with their weights in the signals
-        depth: layers, to which light is assigned by the distance of its surface; light: reflections that are followed
+        depth: layers, among which a surface's light is divided by its distance; light: reflections, see `Fidelity`
         views: places and directions of the eyes; None: the random views of this object
-        most: largest total number of rays, which limits the number of views; at least 12 views are rendered anyway
+        most: largest total number of samples, which limits the number of views to a value from 12 to 96
         """
         rays = len(trial.directions)
         views = (views or self._views).take(int(np.clip(most // rays, *VIEWS)))
@@ -226,7 +226,7 @@ class FidelityTrials:
         return self._eye.aperture_throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
 
     def _see_areas(self, views: RandomViews, trial: Trial, light: str, depth: DepthLayers) -> list[np.ndarray]:
-        """Return the mean light in all areas: a flat array (view, area) per depth layer and component of light."""
+        """Return the mean light in all areas of a trial: a flat array (view, area) per layer and light component."""
         tracer = self._scene.areas(light)
         origins, directions = views.in_agents(self._eyes, trial.directions)
         n = len(trial.directions)
@@ -244,7 +244,7 @@ class FidelityTrials:
             return [np.array(c) for c in components]
 
     def _lit(self, tracer: AreaTracer, bodies: list[np.ndarray]) -> list[Array]:
-        """Return the tracer's table of illuminated bodies, for bodies with these centres, (view, 3) each."""
+        """Return the tracer's table of the light that falls on bodies with these centres, (view, 3) each."""
         if not tracer.places:
             return []
         place = dr.arange(mi.UInt32, tracer.places * len(bodies[0])) % tracer.places

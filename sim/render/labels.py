@@ -27,7 +27,8 @@ class Labels:
 
     scene: the model and its eyes; Mitsuba traces all rays
 
-    `depth`, `ids` and `flow` raise a ValueError for poses that `EyeRenderer.signals` refuses.
+    `depth`, `ids` and `flow` raise a ValueError for the same poses as `EyeRenderer.signals`, for example poses of
+    another model.
 
     Raises:
         ValueError: the eye is a compound eye, which has no flat retina on which depth and flow are defined.
@@ -72,8 +73,9 @@ class Labels:
     def flow(self, poses: Placed, later: Placed) -> np.ndarray:
         """Return the optic flow between two moments: its components to the right and down [receptors].
 
-        It is the motion on the retina of the point that each receptor's centre sees: (env, eye, 2, height, width)
-        float32. It is NaN if the centre sees no geom, or if the point is not in front of the eye at the later moment.
+        A receptor's centre sees a point, and the flow is the displacement of this point's image on the retina. It is
+        NaN if the centre sees no geom, or if the point is not in front of the eye at the later moment. The result is an
+        array (env, eye, 2, height, width) float32.
         """
         moments = self.scene.placed(poses), self.scene.placed(later)
         self.scene.check_poses(moments[1], self.n_envs)
@@ -86,7 +88,7 @@ class Labels:
 
     @property
     def recordings(self) -> int:
-        """Number of times that the kernels were recorded."""
+        """Number of times that Dr.Jit has recorded the kernels for depth and for geom ids."""
         return self._distances.n_recordings + self._hits.n_recordings
 
     def _at_centres(self, kernel: Any, scenes: Scenes, poses: Placed) -> np.ndarray:

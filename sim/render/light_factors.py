@@ -40,14 +40,16 @@ class LightFactors:
 
     @property
     def level(self) -> np.ndarray:
-        """Factor by which the signals of each world are multiplied, (env, 1, 1, 1, 1). It is the factor of all its
-        bands."""
+        """Factor by which the signals of each world are multiplied, (env, 1, 1, 1, 1).
+
+        It may be used only if all bands of a world have the same factor (`is_level`).
+        """
         return self.bands[:, :1, None, None, None]
 
     def on_bands(self, layers: np.ndarray, basis: np.ndarray | None, n_eyes: int) -> np.ndarray:
         """Return light in bands, multiplied by these factors, (layer, band, all rays of all views).
 
-        layers: light in components, (layer, component, all rays of all views)
+        layers: light in each depth layer and each component of the spectrum, (layer, component, all rays of all views)
         basis: contribution of a component to each band, (component, band); None: components are bands
         """
         if basis is not None:

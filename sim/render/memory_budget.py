@@ -1,4 +1,4 @@
-"""A check, before rendering starts, that its arrays fit into memory.
+"""A check, before rendering starts, that the arrays of the rendering fit into memory.
 
 Without this check, the system would kill the process without a message.
 """
@@ -30,10 +30,9 @@ class Demand:
     worlds: number of worlds
     eyes: number of eyes of one agent
     resolution: receptors (height, width) of an eye
-    planes: number of values that are stored for every ray, which is the number of components of light times that of
-        depth layers
-    weights: number of weights that each ray has for each receptor, which is the number of bands times that of depth
-        layers; 0 without a pupil
+    planes: number of values that are stored for every ray: (number of components of light) · (number of depth layers)
+    weights: number of weights that each ray has for each receptor: (number of bands) · (number of depth layers); 0
+        without a pupil
     """
 
     rays_per_receptor: float
@@ -57,8 +56,8 @@ class Demand:
     def bytes(self) -> float:
         """Number of bytes that rendering needs, at least.
 
-        They are for the array that the rendering kernel writes, for the directions and starting points of the rays, and
-        for the weights of all rays in the signals of one row of receptors.
+        They hold the array that the rendering kernel writes, the directions and starting points of the rays, and the
+        weights with which all rays contribute to one row of receptors.
         """
         return 4 * self.elements + self.rays * (RAY_BYTES * self.eyes + 16 * self.weights * self.resolution[1])
 
@@ -86,9 +85,9 @@ def check_memory(demand: Demand) -> None:
 def available() -> float:
     """Return the number of bytes that are available without swapping.
 
-    It is the smaller of two numbers: the bytes available on the machine, and those that the limit of its container
-    leaves. If the system does not report the machine's available bytes, its total memory is used. If that is unknown,
-    too, it counts as infinite.
+    It is the smaller of two numbers: the bytes available on the machine, and the bytes that this process may still use
+    under the memory limit of its container. If the system does not report the machine's available bytes, its total
+    memory is used. If that is unknown, too, it counts as infinite.
     """
     return min(_of_machine(), _of_container(CGROUPS))
 
@@ -123,7 +122,7 @@ def _of_container(root: Path) -> float:
 
 
 def _of_files(statistics: Path, prefix: str) -> int:
-    """Return the number of bytes in cached files. The system frees these bytes when memory is needed."""
+    """Return the number of bytes that the system uses to cache files, and frees when memory is needed."""
     try:
         lines = [line.split() for line in statistics.read_text("ascii").splitlines()]
         return sum(int(size) for name, size in lines if name in (f"{prefix}active_file", f"{prefix}inactive_file"))

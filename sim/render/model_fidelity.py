@@ -1,10 +1,10 @@
-"""Choice of the number of rays for eyes on a user model: the smallest with an allowed error at given moments.
+"""Choice of the smallest number of rays for eyes on a user's model with which the error of signals is allowed.
 
-A moment is a set of poses. Each moment is rendered with increasing numbers of rays, and with many rays as a reference.
-A receptor needs only one ray if the light is the same in all parts of its visual field (a uniform field). If most
-receptors have a uniform field, a mean error over all receptors would be small, even if the others had large errors. The
-error is therefore computed only over receptors whose error with the smallest number of rays exceeds a tenth of the
-allowed error.
+The user gives one or more moments, each of which is a set of poses. Each moment is rendered with increasing numbers of
+rays, and with many rays as a reference. A receptor needs only one ray if the light is the same in all parts of its
+visual field (a uniform field). If most receptors have a uniform field, a mean error over all receptors would be small,
+even if the others had large errors. The error is therefore computed only over receptors whose error with the smallest
+number of rays exceeds a tenth of the allowed error.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Trials:
     Receptors are left out if the smallest number of rays already gives them nearly the right signal. The light in the
     visual field of such a receptor is almost uniform.
 
-    errors: root mean square error over the other receptors, for each number of rays per receptor
+    errors: root mean square error over the receptors that are not left out, for each number of rays per receptor
     share: fraction of all receptors that are not left out
     """
 
@@ -82,9 +82,9 @@ def choose_model_fidelity(
 
     model, eye, mounts: see `ModelRenderer`
     poses: poses at one or more moments that are typical of later use, as a list of MjData or as `sim.Poses`
-    tolerance: allowed error of a signal (root mean square), over the receptors that need more than the smallest number
-        of rays, because the light in their visual field is not uniform; None: half of the eye's `noise_sigma`, but at
-        least 0.005 times the signal of a white surface
+    tolerance: allowed root mean square error of a signal. Receptors for which the smallest number of rays is enough are
+        left out of the mean. None: half of the eye's `noise_sigma`, but at least 0.005 times the signal of a white
+        surface
     groups, spectra, varied, medium: see `ModelRenderer`
     light: "direct" (one reflection) or "bounce" (up to two), see `Fidelity`. "auto" considers the receptors that light
         reaches after two reflections in these poses. If their error without this light is above the tolerance, "bounce"
@@ -118,7 +118,7 @@ class ModelStages:
     Errors are computed by rendering the model in given poses.
 
     scene: the model and its eyes
-    moments: poses for which errors are computed, one or more sets of them
+    moments: one or more sets of poses, in which errors are computed
     allowed: allowed error of a signal (root mean square)
     light: see `choose_model_fidelity`
     """

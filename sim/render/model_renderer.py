@@ -41,14 +41,14 @@ class ModelRenderer(EyeRenderer):
         and spheres
     groups: visible geom groups
     spectra: reflectances of materials and emission of lights by name, instead of their colours, see `sim.mirror`
-    varied: names of geoms whose size or colour may differ between worlds. The poses that are rendered then contain the
-        size and colour of each geom in each world. A mapping such as {"floor": ("sand", "grass")} also lists materials
-        that a geom may have; the colour of such a geom depends only on its material
+    varied: names of geoms whose size or colour may differ between worlds. Each world's sizes and colours are given with
+        its poses (`sim.Poses`). A mapping such as {"floor": ("sand", "grass")} also lists materials that a geom may
+        have; the colour of such a geom depends only on its material
     tracer: "mitsuba" (any shapes), "closed_form" (upright walls, a floor and spheres), or "auto": the closed form if
         the model has one. Compound eyes need "mitsuba". The tracer in use is in `.tracer.name`
     medium: water or air between surfaces and eyes, see `sim.build_world`
-    brightest: attribute, the larger of two signals: that of a white surface that faces all directional lights at once,
-        and that of veiling light
+    brightest: attribute, the signal of a white surface that faces all directional lights at once, or the signal of
+        veiling light if that is larger
 
     One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Further warnings name lamps
     with spectral lines for which the eye has too few bands.

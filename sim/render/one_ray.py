@@ -19,10 +19,11 @@ from sim.worlds.world import World
 
 
 def see(world: World, eyes: Eyes, state: WorldState, index: int = 0) -> np.ndarray:
-    """Return the noise-free signals of one world of a state, (eye, channel, height, width).
+    """Return the noise-free signals of the eyes in one world, (eye, channel, height, width).
 
     Channels are the types of receptors. A pupil, a waveguide and a mosaic of receptors are ignored.
 
+    state: state of one or more worlds
     index: index of the world in the state
 
     Raises:

@@ -1,4 +1,4 @@
-"""Optic flow: the motion of visible points on the retina, from geometry alone.
+"""Optic flow: the motion, on the retina, of the images of visible points, from geometry alone.
 
 A point on a rigid body moves with the body, and an eye moves with its own body (Longuet-Higgins & Prazdny 1980). The
 flow between two moments is exact for any motion between them.

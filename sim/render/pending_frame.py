@@ -65,7 +65,7 @@ class FrameSlot:
             self._under_way = None
 
     def launch(self, launch: Callable[[], Callable[[], np.ndarray]]) -> PendingFrame:
-        """Launch the next frame once the buffers are free.
+        """Launch the next frame as soon as the pending frame no longer needs the kernel's buffers.
 
         launch: starts the kernel, and returns a function that reads its output
         """

@@ -3,8 +3,8 @@
 To test a way of rendering, the signals of a few receptors in some views are computed and compared with a reference.
 There are two populations. The first contains random receptors in views from random places. The second, in worlds with
 objects, contains receptors that see an object, in views with an object nearby. It is separate because objects decide
-how an episode ends. Most receptors see floor and walls, and would hide errors at objects. All draws have fixed seeds,
-so the same world and eyes give the same populations.
+how an episode ends. Most receptors see floor and walls, and would hide errors at objects. Views and receptors are drawn
+at random with fixed seeds, so the same world and eyes give the same populations.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ON_OBJECT = 0.02  # a receptor sees an object that fills more than this fraction
 
 @dataclass(frozen=True)
 class Population:
-    """Views of a world through single eyes, and the receptors whose signals are computed in each view to find errors.
+    """Views of a world, each through one eye, and the receptors for which errors of rendering are computed.
 
     receptors: indices of the receptors, row by row
     counted: True if the receptor's error in this view is included in the mean error, (view, receptor)
@@ -47,7 +47,9 @@ class Population:
 
 
 def everywhere(scene: WorldScene, views: int) -> Population:
-    """Return a given number of views from random places, and random receptors, which all count in every view.
+    """Return a given number of views from random places, and random receptors.
+
+    All these receptors are included in the mean error of rendering, in every view.
 
     views: number of views
     """
@@ -57,10 +59,10 @@ def everywhere(scene: WorldScene, views: int) -> Population:
 
 
 def near_objects(scene: WorldScene, sampling: EyeSampling, views: int, rays: int) -> Population:
-    """Return views near objects, and random receptors that see an object in some of them.
+    """Return views in which an object is near, and random receptors that see an object in some of these views.
 
-    A receptor counts only in the views in which it sees an object. In an eye with a wide field, an object fills few
-    receptors. Receptors that often see an object are therefore drawn with a higher probability.
+    A receptor is included in the mean error only in the views in which it sees an object. In an eye with a wide field,
+    an object fills few receptors. Receptors that often see an object are therefore drawn with a higher probability.
 
     views: number of views
     rays: number of rays, through all receptors together, that test which receptors see an object

@@ -49,8 +49,8 @@ class PreparedScene:
     groups: visible geom groups
     varied: names of geoms whose size, colour or material may differ between worlds, see `sim.ModelRenderer`
     tracer: "mitsuba", "closed_form" or "auto", see `sim.BatchedRenderer`
-    stand: the body that carries all eyes and moves only in a horizontal plane, with their places on it. None: it is
-        derived from the mounts, if there is such a body
+    stand: the body that carries all eyes, and the eyes' places on this body, which moves only in a horizontal plane.
+        None: it is derived from the mounts, if there is such a body
     medium: water or air that fills the world; under water, an `optics.Eye` is immersed, but the refractive index in
         front of the facets of a compound eye does not change. None: clear air
 
@@ -102,9 +102,9 @@ class PreparedScene:
 
     @property
     def white(self) -> np.ndarray:
-        """Radiance (band,) of a white surface that faces all directional lights, or of veiling light.
+        """Largest radiance of a white surface or, in a medium, of the veiling light, array (band,).
 
-        In each band, it is the larger of these two radiances.
+        The surface faces all directional lights. In each band, the larger of the two radiances is taken.
         """
         levels = [light.level for light in self.scene.lights.found if light.kind == "directional"]
         surface: np.ndarray = sum(levels, np.zeros(self.eye.bands)) / np.pi
@@ -162,7 +162,7 @@ class PreparedScene:
         return sampling.area_trial(per_receptor, receptors, in_rows=self._in_rows)
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether large areas, each shared by several receptors, preserve the differences between neighbours.
+        """Return whether areas that several receptors share are small enough to distinguish neighbouring receptors.
 
         Areas are rectangles of the visual field in which the mean light is computed. If they are too large,
         neighbouring receptors may have equal signals. The result is False for a perfect lens, whose receptors share no
@@ -183,9 +183,10 @@ class PreparedScene:
         return isinstance(upright, UprightScene) and len(upright.spheres) > 0
 
     def sampling(self, depth: DepthLayers, tolerance: float | None = None) -> WorldSampling:
-        """Return the method that places samples in the eye's visual field and weights them for each receptor.
+        """Return an object that chooses samples (rays or areas) in the eye's visual field.
 
-        The eye's PSFs for the distances in `depth` are computed at the first call, and kept.
+        It also computes the weights with which each receptor sums the light of the samples. The eye's PSFs for the
+        distances in `depth` are computed at the first call, and kept.
 
         depth: distances for which the eye has a PSF
 
@@ -208,7 +209,8 @@ class PreparedScene:
 
         Raises:
             ValueError: the number of worlds is wrong; the poses belong to another model, are not finite or have not
-                been computed yet; or the worlds differ from the model in a part that is not in `varied`.
+                been computed yet; or a world differs from the model in a way that the renderer cannot show, for example
+                in the colour of a geom that was not named in the scene's argument `varied`.
         """
         self.check_count(poses, n_envs)
         if isinstance(poses, MovedBodies):  # all other quantities are as in the model

@@ -46,9 +46,9 @@ class RandomViews:
         return np.column_stack([self.position, np.full(len(self), EYE_HEIGHT)])
 
     def in_agents(self, eyes: Eyes, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the eyes' positions [m], (n, 3), and directions, (n, r, 3), in the world.
+        """Return each view's eye position [m], (view, 3), and `directions` in the world's frame, (view, direction, 3).
 
-        directions: in an eye's frame, (r, 3)
+        directions: unit vectors in the frame of an eye, the same for all eyes, (direction, 3)
         """
         azimuths = eyes.azimuths()
         in_agent = np.einsum("eij,rj->eri", eye_rotations(azimuths), directions)[self.eye]
@@ -64,9 +64,10 @@ class RandomViews:
 
 
 def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
-    """Return views in random directions from random places in the start cells of agents and objects.
+    """Return `n` random views: a random eye of an agent that stands at a random place with a random heading.
 
-    Objects are on cells in which objects may start. The views are the same at every call, because the seed is fixed.
+    The place is in a cell in which agents or objects may start an episode. Objects are on random cells in which objects
+    may start. The views are the same at every call, because the seed is fixed.
     """
     rng = np.random.default_rng(0)
     cells, objects = _cells(world), _objects(world, n, rng)

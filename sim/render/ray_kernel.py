@@ -64,7 +64,7 @@ class Frame:
 
 
 class Moving:
-    """Buffers from which a kernel reads the poses in all worlds, the only inputs that change between its calls."""
+    """Buffers from which a kernel reads the poses in all worlds. Its other inputs are the same in every call."""
 
     def __init__(self, eyes: EyeRays, things: Buffers) -> None:
         self._eyes, self._things = eyes, things
@@ -108,7 +108,8 @@ class RayKernel:
         worlds, share a kernel.
 
         ways: directions of the samples in the eye's frame, (ray, 3)
-        bounces: points in the unit square, (ray, 2), see `sim.eyes.sensor.BoxSensor`; None: direct light only
+        bounces: points in the unit square, from which the directions of bounced light are computed, (ray, 2); None:
+            direct light only
         facets: weights and starting points of the samples; None: all weights are 1, and samples start at the pupil
         """
         lanes = self.n_envs * self.n_eyes * len(ways)
@@ -126,8 +127,8 @@ class RayKernel:
     def sums(self, scenes: Any, frame: Frame, inputs: KernelInputs, lanes: int, reduced: int) -> Array:
         """Return sums of the light over groups of `reduced` adjacent lanes.
 
-        Each lane traces one ray: a sample of an eye in a world. Components are the parts, such as spectral bands, in
-        which light is computed. The sums are a flat array with the axes (layer, component, world, eye, group of lanes).
+        Each lane traces one ray, from one eye in one world. The light of a ray has several components, for example one
+        per spectral band. The sums are a flat array with the axes (layer, component, world, eye, group of lanes).
 
         lanes: total number of lanes
         """
@@ -144,8 +145,8 @@ class RayKernel:
     def layers(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> list[Array]:
         """Return the light along each lane's ray, one array per depth layer and component.
 
-        Each lane traces one ray: a sample of an eye in a world. Components are the parts, such as spectral bands, in
-        which light is computed. All components of the first depth layer come first.
+        Each lane traces one ray, from one eye in one world. The light of a ray has several components, for example one
+        per spectral band. All components of the first depth layer come first.
         """
         lane = Lane.from_index(inputs.lanes, inputs.counts)
         seen, there = self.seen(scenes, frame, inputs, lane)
@@ -162,10 +163,10 @@ class RayKernel:
         return [component * share for share in shares for component in components]
 
     def seen(self, scenes: Any, frame: Frame, inputs: KernelInputs, lane: Lane) -> tuple[EyeRay, Any]:
-        """Return each lane's ray, and the surfaces and lights that it can meet in its world.
+        """Return the rays of all lanes, and the surfaces and lights that each ray can meet.
 
-        A lane is a sample of an eye in a world. The tracer determines the type of the second result, see
-        `Tracer.around`.
+        Each lane traces one ray, from one eye in one world, and the ray meets only surfaces and lights of this world.
+        The tracer determines the type of the second result, see `Tracer.around`.
         """
         seen = self.eyes.ray(frame.eyes, inputs.along, lane, inputs.counts.samples.number)
         return seen, self.tracer.around(scenes, frame.things, inputs.tables, lane.world)

@@ -1,7 +1,8 @@
-"""Receptor noise for many worlds at once: frozen kernels draw standard normal numbers with the generator Philox.
+"""Receptor noise for many worlds at once: kernels draw standard normal numbers with the generator Philox.
 
-A counter-based generator (Salmon et al. 2011) needs only a key per world and the number of drawn frames as its state. A
-world's noise therefore depends on the world's own seed and history, and not on other worlds.
+The kernels are recorded once and then replayed. A counter-based generator such as Philox (Salmon et al. 2011) needs
+only a key per world and the number of drawn frames as its state. A world's noise therefore depends on the world's own
+seed and history, and not on other worlds.
 
 This noise has the same mean, and nearly the same variance and third moment, as the noise of `optics.Eye.see`. That
 method draws numbers of photons (`optics.eye.photoreceptor`).
@@ -174,16 +175,21 @@ class NoiseModel:
         return shot, NoiseModel(self.sigma) if self.sigma > 0 else None
 
     def largest(self, brightest: float) -> float:
-        """Return the largest standard deviation, over receptors, of the noise in a signal of 2 * `brightest`."""
+        """Return the largest standard deviation that the noise has in any receptor if its signal is 2 * `brightest`.
+
+        An observation's upper limit is this signal and a margin for the noise.
+        """
         shot = 0.0 if self.photons is None else 2 * brightest / float(self.photons.min())
         return math.sqrt(self.sigma**2 + shot)
 
     def __call__(self, signals: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """Return noisy signals (n, ...) from standard normal numbers z of the same shape, which may be overwritten.
+        """Return the signals with noise, computed from standard normal numbers of the same shape, (n, ...).
 
-        For each signal s, V is the variance of its noise, and N the number of photons for a signal of 1. Shot noise
-        nearly agrees with the Poisson distribution up to the third moment: s + √V z + s/N² (z² - 1) / 6V (Cornish &
-        Fisher 1938). The third moment matters below a hundred photons.
+        A signal s with the normal number z becomes s + √V z + (s / N²) (z² - 1) / (6 V), where V is the variance of the
+        noise and N the number of photons for a signal of 1 (Cornish & Fisher 1938). The last term gives shot noise
+        nearly the third moment of the Poisson distribution, which matters below a hundred photons.
+
+        normals: the numbers z; this method may overwrite them
         """
         if self.photons is None:
             normals *= np.float32(self.sigma)

@@ -65,7 +65,7 @@ class ReceptorsInTime:
         self._before[worlds] = self.state[worlds]
 
     def undo(self, worlds: np.ndarray) -> None:
-        """Return to the stored state in these worlds, because their last frame is rendered again."""
+        """Restore the state that `store` kept for these worlds, so that their last frame can be rendered again."""
         self.state[worlds] = self._before[worlds]
 
     def step(self, signals: np.ndarray, worlds: np.ndarray) -> np.ndarray:
@@ -96,9 +96,10 @@ class ReceptorsInTime:
             self.state[worlds, self._others + 1] = 0
 
     def _filtered(self, rows: np.ndarray, signals: np.ndarray) -> np.ndarray:
-        """Return the signals after the low-pass filter and the delay by the latency, (world, *shape).
+        """Return the signals after the low-pass filter and a delay by the latency, (world, *shape).
 
-        rows: states of the filters of these worlds, (world, filter, *shape), which are advanced by a frame in place
+        rows: states of the filters in the worlds of the signals, (world, filter, *shape). They are replaced by the
+            states one frame later
         """
         x = self._ms / self.dynamics.time_constant_ms
         low, decay = rows[:, self._low], np.float32(math.exp(-x))
@@ -151,7 +152,7 @@ class ReceptorsInTime:
         return found
 
     def _steady(self, signals: np.ndarray) -> np.ndarray:
-        """Return the responses to constant signals (world, *shape), without motion detectors."""
+        """Return the constant responses to constant signals, before any motion detectors, array (world, *shape)."""
         if self.dynamics.event_threshold or self.dynamics.adaptation == "logarithmic":
             return np.zeros_like(signals)
         if self.dynamics.adaptation == "none":

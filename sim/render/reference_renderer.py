@@ -34,17 +34,17 @@ MOST_PIXELS = 16  # chosen: the largest number of pixels along a cell's side
 class ReferenceRenderer:
     """A renderer of one eye at a time: it traces an image on the tangent plane, and passes it to `optics.Eye.see`.
 
-    The methods raise the errors of `Mirror.render` for an invalid integrator, sampler, seed or `spp`.
+    Each receptor is divided into cells, which have the same ratio of height to width as the receptor. The methods raise
+    the errors of `Mirror.render` for an invalid integrator, sampler, seed or `spp`.
 
     world, eyes: as in `sim.BatchedRenderer`
     integrator: Mitsuba's integrator: "path", "direct", or a description such as {"type": "path", "max_depth": 3}
-    spp: samples per pixel of an image, 1 to 2³¹ - 1; a cell (see below) is one pixel if receptors are square, and
-        several otherwise
+    spp: samples per pixel of an image, 1 to 2³¹ - 1. A cell is one pixel if receptors are square, and several otherwise
     samples_per_receptor: cells along a receptor's side, 1 to 64; None: 1 for a perfect lens, 4 behind a pupil, and more
         for narrow rhabdoms
-    depths: nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all light is
-        blurred like light from infinity
-    depth_layers: number of kernels between these distances, 1 to 64, or "auto"
+    depths: nearest and farthest distance [m]. Between them, the PSF depends on the distance of the visible surface.
+        None: all light is blurred like light from infinity
+    depth_layers: number of distances in `depths` for which a PSF is computed, 1 to 64, or "auto"
     sampler: Mitsuba's sampler: "independent", or "multijitter" for less noise
     variant: spectral variant of Mitsuba, such as "scalar_spectral", which runs without LLVM; None: the default of this
         machine

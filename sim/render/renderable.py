@@ -16,11 +16,11 @@ def check_renderable(fidelity: Fidelity, eye: WorldEye) -> None:
     eye: an eye in a world
 
     Raises:
-        ValueError: the eye has an eccentricity, its number of bands differs from the fidelity's, or it cannot be
-            rendered with the kind of samples or the depth layers of the fidelity. Samples "edges" (adaptive edge
-            sampling) need a perfect lens, direct light and at least four rays per receptor. Samples "areas" (rectangles
-            of the visual field over which light is averaged) need receptors of equal size. Compound eyes support only
-            samples "rays" and a single depth layer.
+        ValueError: the eye's `eccentricity_deg` is not (0, 0), its number of bands differs from the fidelity's, or it
+            cannot be rendered with the kind of samples or the depth layers of the fidelity. Samples "edges" (adaptive
+            edge sampling) need a perfect lens, direct light and at least four rays per receptor. Samples "areas"
+            (rectangles of the visual field over which light is averaged) need receptors of equal size. Compound eyes
+            support only samples "rays" and a single depth layer.
     """
     world_eye("eye", eye)
     if not isinstance(eye, CompoundEye) and any(eye.eccentricity_deg):

@@ -76,8 +76,8 @@ def _left(light: Level, allowed: Allowed) -> float:
     """Return the largest error due to sampling with which the total error is at most the allowed one.
 
     The total error has two causes: a finite number of samples, and light that is omitted. The squares of the two errors
-    add. If omitted light alone causes the allowed error or more, the result is nearly 0, so that any number of rays is
-    rejected.
+    add. If omitted light alone causes at least the allowed error, the result is nearly 0, so that no number of rays is
+    accurate enough.
     """
     left_out = light.predicted_error or 0
     return math.sqrt(max(allowed.without_light**2 - left_out**2, (1e-6 * allowed.without_light) ** 2))
@@ -95,9 +95,9 @@ def _areas(
     An area is a rectangle of the visual field over which light is averaged. If every number of areas that is tried
     causes an error above the allowed one, return the lowest number whose error is close to the smallest.
 
-    shared: numbers below 1 of areas per receptor, in decreasing order. With such a number, an area is larger than a
-        receptor, and neighbouring receptors share it. These numbers are tried only if one area per receptor is accurate
-        enough.
+    shared: additional numbers of areas per receptor, all below 1, in decreasing order. With such a number, an area is
+        larger than a receptor, and neighbouring receptors share it. These numbers are tried only if one area per
+        receptor is accurate enough.
     """
     if not trials.have_areas(*((BOUNCE, ALL) if light.level == BOUNCE else (light.level,))):
         return None
@@ -117,10 +117,11 @@ def _areas(
 def _fewest(
     error: Callable[[float], float], numbers: tuple[float, ...], allowed: float, kind: str
 ) -> tuple[float, Level, bool]:
-    """Return the lowest number of samples whose error is allowed, its `Level`, and True.
+    """Return the lowest sufficient number of samples per receptor, a `Level` that describes this choice, and True.
 
-    If no number is accurate enough, return the lowest number whose error is close to the smallest one, its `Level`, and
-    False. Errors are assumed to fall at most like 1/n, so numbers that are certainly too low are skipped.
+    A number is sufficient if its predicted error is at most `allowed`. If no number is, return the lowest number whose
+    error is close to the smallest error, its `Level`, and False. An n times larger number of samples is assumed to
+    divide the error by at most n, so numbers that are certainly too low are skipped.
     """
     at = 0
     tried: dict[float, float] = {}

@@ -1,4 +1,4 @@
-"""Choice of a fidelity (accuracy of rendering) for a built-in world and given eyes, by trials in random views."""
+"""Choice of a fidelity (accuracy of rendering) for a built-in world and given eyes, by rendering random views."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def choose_fidelity(
     tolerance: allowed error of a receptor's signal (root mean square, in the unit of signals). The error over
         all receptors and the error over receptors that see a nearby object must both be within it. None: half of the
         eyes' `noise_sigma`, but at least 0.005 times the signal of a white surface
-    bands: "auto": the lowest number of spectral bands that is accurate for scenes of any colours; "own": the number in
-        `eyes`, which environments also use. Compound eyes always use their own bands.
+    bands: "auto": the lowest number of spectral bands that is accurate for scenes of any colours; "own": the number of
+        bands in `eyes`, with which environments render as well. Compound eyes always use their own bands.
     tracer: tracer that renders the random views, see `sim.BatchedRenderer`
 
     Raises:
@@ -67,7 +67,7 @@ def chosen_fidelity(scene: WorldScene, tolerance: float | None = None) -> Fideli
 
 
 def _moments(scene: WorldScene) -> Poses:
-    """Return poses of the world in which the error of rendering compound eyes is measured.
+    """Return poses of the agent and the objects in which the error of rendering compound eyes is measured.
 
     The agent stands at random places. If the world has objects, further poses place it near an object.
     """

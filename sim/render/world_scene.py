@@ -1,4 +1,4 @@
-"""A built-in world, prepared for its agents' eyes."""
+"""A built-in world and the eyes of its agents, prepared for rendering."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ tessellation     geoms as triangles with MuJoCo's texture coordinates
 cube             triangles under cube textures
 surfaces         colours and textures
 coincident       geoms in the same place
-model_hash       hash of a model, a key of kept values
+model_hash       hash of a model, under which values computed from it are stored
 linear_textures  textures whose values are linear light
 bsdfs            materials as BSDFs
 spectra          measured spectra that replace colours
@@ -27,7 +27,7 @@ poses            Poses: poses, sizes, colours and materials in all worlds
 moved_bodies     poses of models in which only a few bodies move
 variation        ranges of quantities that differ between episodes
 world_models     a model for each world, if worlds differ
-model_settings   fields of a model that physics uses, as bytes
+model_settings   the fields of a model that physics uses, as bytes
 appearances      materials that a geom may have
 model_snapshot   a renderer's model at the time when the renderer was made
 primitive_geoms  geoms that rays intersect in closed form

@@ -1,8 +1,9 @@
-"""Appearances of geoms: one for each geom, or one for each material that an episode may choose for the geom.
+"""Appearances of geoms: if episodes choose a geom's material, it has one for each material, otherwise a single one.
 
-The appearance in a material is built as if the geom had that material in the model, including texture, mapping and
-glow. If a geom has appearances in several materials, each of them is a separate moving shape, and a world shows only
-one. Worlds with different materials therefore share one kernel, and geoms with a single appearance cost nothing extra.
+The appearance for a material is built as if the geom had that material in the model, including texture, mapping and
+glow. If a geom has several appearances, each of them is a separate moving shape, and each world shows only one of these
+shapes. The scene contains the shapes for all materials, so one rendering kernel serves worlds with different materials.
+Geoms with a single appearance cost nothing extra.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class Appearance:
 
     @property
     def surface(self) -> tuple[Hashable, ...]:
-        """Numbers that determine the geom's BSDF, apart from the model's materials and textures."""
+        """Values that, together with the model's materials and textures, determine the geom's BSDF."""
         to_uv = shapes.uv_transform(self.model, self.geom)
         return (
             self.material,
@@ -65,8 +66,8 @@ def appearances_of(
     A geom has one appearance, or one for each material that it may have. Appearances with an alpha of 0 are omitted.
 
     geoms: ids of visible geoms
-    materials: for geoms whose material differs between episodes, by the geom's id: ids of the materials of which each
-        episode chooses one
+    materials: ids of the materials from which each episode chooses one for a geom. The key is the geom's id. Geoms
+        whose material is fixed are not included
     """
     found = []
     for geom in geoms:

@@ -58,11 +58,11 @@ def measured(model: mujoco.MjModel, spectra: Spectra) -> list[Spectrum]:
 
 
 def band_error(reflectances: Iterable[Spectrum], receptors: Any, bands: int) -> float:
-    """Return the error of signals if `bands` spectral bands represent these reflectances in daylight.
+    """Return the error of receptors' signals from surfaces in daylight if light is divided into `bands` spectral bands.
 
-    The reference has 64 bands. The error is the largest difference over reflectances and receptor types, as a fraction
-    of the signal of a white surface. It is 0 without reflectances, and does not include blur that differs from band to
-    band.
+    The error is the difference from the signals with 64 bands, as a fraction of the signal of a white surface. The
+    largest difference over reflectances and receptor types is returned, or 0 if there are no reflectances. Errors of
+    blur that differs from band to band are not included.
 
     Raises:
         ValueError: `optics.receptors_of` does not accept the receptors, or `bands` is not a whole number from 1 to 64.

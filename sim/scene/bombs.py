@@ -80,7 +80,9 @@ def require_modest_file(path: Path, name: str, seen: frozenset[Path] = frozenset
 
 
 def require_finite(model: mujoco.MjModel, name: str) -> None:
-    """Refuse a model in which a geom, a body, the pose of a light or the colour of a material is not finite.
+    """Refuse a model in which a pose, size or colour contains an infinite or undefined number.
+
+    Poses of geoms, bodies and lights, sizes of geoms, and colours of geoms and materials are checked.
 
     Raises:
         ValueError: a value is not finite; the message names the element that has this value.

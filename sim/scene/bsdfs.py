@@ -114,7 +114,10 @@ def _diffuse(model: mujoco.MjModel, geom: int, color: Description) -> Descriptio
 
 
 def _matter(model: mujoco.MjModel, geom: int, color: Description) -> Description:
-    """Return the Mitsuba BSDF of a geom's material with this colour (a Mitsuba texture)."""
+    """Return Mitsuba's description of the BSDF of a geom's material.
+
+    color: Mitsuba's description of the texture that gives the material's colour
+    """
     material = model.geom_matid[geom]
     if material < 0 or not has_gloss(model, material):
         return _diffuse(model, geom, color)

@@ -1,11 +1,11 @@
 """Cube textures: six square images around a geom, mapped to its triangles.
 
-MuJoCo looks up a cube texture by direction. The direction consists of a point's coordinates in the geom's frame. On
-primitives, these coordinates are divided by the geom's half sizes (see `directions` for the caps of capsules), unless
-the texture is uniform. Mitsuba has no such texture. Triangles are therefore cut along the seams between faces of the
-cube. Their texture coordinates refer to one image in which the six faces are stacked vertically, in MuJoCo's order R L
-U D F B: R/L = +x/-x, U/D = +y/-y, F/B = +z/-z. The columns and rows of each face are oriented as in OpenGL (table 3.19
-of its 2.1 specification).
+MuJoCo looks up a cube texture by the direction from the geom's centre to a point of the geom. On primitives (geoms that
+are not meshes, SDFs or height fields), the point's coordinates are first divided by the geom's half sizes, unless the
+texture is uniform. The caps of capsules are an exception, see `directions`. Mitsuba has no such texture. Triangles are
+therefore cut along the seams between faces of the cube. Their texture coordinates refer to one image in which the six
+faces are stacked vertically, in MuJoCo's order R L U D F B: R/L = +x/-x, U/D = +y/-y, F/B = +z/-z. The columns and rows
+of each face are oriented as in OpenGL (table 3.19 of its 2.1 specification).
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ def padded(pixels: np.ndarray) -> np.ndarray:
 def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uniform: bool) -> np.ndarray:
     """Return the directions in which MuJoCo looks up a cube texture for points of a geom, (point, 3).
 
-    A direction is the point divided by the geom's half sizes. On a capsule's caps, its z is ±(1 + d / radius) instead,
-    where d [m] is the distance along z beyond the end of the cylindrical side. For meshes, SDFs and height fields, the
-    direction is the point itself. If `uniform` is True, x, y and z of all these directions are then multiplied by the
-    half sizes.
+    A direction is the point divided by the geom's half sizes. On a capsule's caps, the direction's z is ±(1 + d/radius)
+    instead, where d [m] is the distance along z beyond the end of the cylindrical side. For meshes, SDFs and height
+    fields, the direction is the point itself. If `uniform` is True, x, y and z of all these directions are then
+    multiplied by the half sizes.
 
     vertices: points in the geom's frame [m], (point, 3)
     kind: type of the geom
@@ -144,10 +144,10 @@ def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
 
 
 def _halved(pieces: np.ndarray) -> np.ndarray:
-    """Return the triangles, subdivided until texture coordinates are nearly linear within each.
+    """Return the triangles, divided until linear interpolation of texture coordinates within each is accurate enough.
 
-    A triangle in which they are not is bisected at the midpoint of its longest edge. This is repeated at most _HALVINGS
-    times.
+    If the interpolation error in a triangle is too large, the triangle is bisected at the midpoint of its longest edge.
+    This is repeated at most _HALVINGS times.
     """
     done = []
     for _ in range(_HALVINGS):

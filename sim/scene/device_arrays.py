@@ -61,7 +61,7 @@ class Divisor:
 
     @classmethod
     def from_number(cls, number: int) -> Divisor:
-        """Return a divisor whose value is `number`, a whole number from 1 to 2³² - 1, as arrays on the device."""
+        """Return a divisor whose value is `number`, from 1 to 2³² - 1. Its fields are arrays on the device."""
         bits = (number - 1).bit_length()
         factor = (2**bits - number) * 2**32 // number + 1
         return cls(*map(one_number, (number, factor, min(bits, 1), max(bits - 1, 0))))
@@ -102,12 +102,13 @@ def as_whole_numbers(values: Any) -> np.ndarray:
 
 
 def counted(n: int) -> Array:
-    """Return the indices 0 ... n - 1 of a kernel's lanes as a stored array, which sets the number of lanes.
+    """Return an array on the device with the numbers 0 ... n - 1, which gives n lanes to a kernel that reads it.
 
     A lane computes one element of a kernel's output. A frozen kernel in which each lane reads its element of this array
     has n lanes. If a kernel reads only tables, Dr.Jit 1.5 derives the number of lanes from one of them. Which table it
-    uses depends on the state of the process. In one case, Dr.Jit replayed 126 of 128 lanes, and left the last receptors
-    dark without a message. tests/test_parameters.py repeats each training run and detects this error.
+    uses depends on the state of the process. In one case, a kernel that renders receptors was replayed with 126 instead
+    of 128 lanes, so that the last receptors stayed dark without a message. tests/test_parameters.py repeats each
+    training run and detects this error.
     """
     found = dr.arange(mi.UInt32, n)
     dr.eval(found)

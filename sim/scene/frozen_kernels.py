@@ -53,7 +53,10 @@ def _names(kind: Any) -> tuple[str, ...]:
 
 
 def _arrays_of(inputs: Any) -> list[Array]:
-    """Return all arrays that `inputs`, an array, a dataclass or a list of these, contains at any depth, in order."""
+    """Return all arrays in the inputs of a kernel, in the order of fields and list entries.
+
+    inputs: an array, None, or a dataclass or list that contains such inputs, nested to any depth
+    """
     if names := _names(inputs.__class__):
         return [array for name in names for array in _arrays_of(getattr(inputs, name))]
     if isinstance(inputs, list):

@@ -42,7 +42,7 @@ class Emitter:
 
     name: name in Mitsuba's scene
     light: id in the model; -1: not one of the model's lights (the camera's headlight, the sky)
-    description: Mitsuba's description of the light, with shadows
+    description: Mitsuba's description of the light as if it cast shadows, whatever `casts_shadow` is
     casts_shadow: the model's setting; False for the headlight, as in MuJoCo
     """
 
@@ -123,7 +123,7 @@ def _evaluate(texture: MitsubaObject, nm: Array) -> np.ndarray:
 
 
 def emitters(model: mujoco.MjModel, data: mujoco.MjData, spectra: Spectra) -> tuple[list[Emitter], list[str]]:
-    """Return emitters of active lights, the headlight and the sky, and messages about omitted features."""
+    """Return emitters for active lights, the headlight and the sky, and messages about features they do not show."""
     found, left_out = [], []
     for light in range(model.nlight):
         if not model.light_active[light]:

@@ -1,11 +1,11 @@
 """Textures whose values are proportional to light (linear light), unlike display colours.
 
 MuJoCo displays the values of all textures in the same way. These values are therefore interpreted as display colours
-(IEC 61966-2-1), as MuJoCo's other colours are. A texture contains linear light only if its source requests it by
-`colorspace="linear"`. The compiler resolves "auto" to linear for image files without a colour chunk, so a compiled
-model does not show whether linear light was requested. The function `compiled` therefore adds to the model a custom
-tuple that lists the textures with this request. The name of the tuple ends with "linear_textures". A user who compiles
-a model can add such a tuple to its MJCF:
+(IEC 61966-2-1), as MuJoCo's other colours are. A texture contains linear light only if the model's MJCF or MjSpec
+declares this by the texture's attribute `colorspace="linear"`. The compiler resolves "auto" to linear for image files
+without a colour chunk, so a compiled model does not show whether linear light was declared. The function `compiled`
+therefore adds to the model a custom tuple that lists the textures with this declaration. The name of the tuple ends
+with "linear_textures". A user who compiles a model can add such a tuple to its MJCF:
 
     <custom><tuple name="linear_textures"><element objtype="texture" objname="NAME"/></tuple></custom>
 """
@@ -23,10 +23,10 @@ _ROLES = (int(mujoco.mjtTextureRole.mjTEXROLE_RGB), int(mujoco.mjtTextureRole.mj
 
 
 def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Compile a specification, and return a model that shows which textures request `colorspace="linear"`.
+    """Compile a specification, and return a model that shows which textures declare `colorspace="linear"`.
 
-    The model lists them in a custom tuple, unless `is_linear` recognises them without it. The name of the tuple ends
-    with "linear_textures".
+    The model lists these textures in a custom tuple whose name ends with "linear_textures". Textures that `is_linear`
+    recognises without the tuple are not listed.
     """
     model = spec.compile()
     requested = [k for k, texture in enumerate(spec.textures) if texture.colorspace == _LINEAR]
@@ -48,9 +48,9 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
 def is_linear(model: mujoco.MjModel, texture: int) -> bool:
     """Return whether a texture contains linear light.
 
-    A texture does so if a mark lists it. (A mark is a custom tuple of the model; the name of the tuple ends with
-    "linear_textures".) A 2-D texture that was not read from a file also does so if the model declares it as linear.
-    (For files, this declaration proves nothing, because the compiler may have resolved "auto" to linear.)
+    A mark is a custom tuple of the model whose name ends with "linear_textures". A texture contains linear light if a
+    mark lists it. A 2-D texture that was not read from a file also contains linear light if the model declares it as
+    linear. For files, this declaration proves nothing, because the compiler may have resolved "auto" to linear.
 
     Raises:
         ValueError: a mark lists an object that is not a texture.
@@ -69,7 +69,7 @@ def resolved(model: mujoco.MjModel) -> list[int]:
 
 
 def request(spec: mujoco.MjSpec, textures: Iterable[int]) -> mujoco.MjSpec:
-    """Return a copy of a specification; the copy requests linear light for the textures with these indices."""
+    """Return a copy of a specification in which the textures with these indices have `colorspace="linear"`."""
     found = spec.copy()
     for k in textures:
         found.textures[k].colorspace = _LINEAR

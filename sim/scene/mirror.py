@@ -29,7 +29,7 @@ VISIBLE_GROUPS = (0, 1, 2)  # groups that MuJoCo draws by default
 
 
 class MirrorWarning(UserWarning):
-    """Warning that names the features of a model that its Mitsuba scene lacks or shows inaccurately."""
+    """Warning that names features of a MuJoCo model that are missing or inaccurate in the model's Mitsuba scene."""
 
 
 def mirror(
@@ -44,7 +44,8 @@ def mirror(
     """Return the mirror of a MuJoCo model: a Mitsuba scene that follows the model's data.
 
     model: an MjModel, or a source that compiles to one: an MjSpec, the path of an MJCF, URDF or MJB file, or MJCF text.
-        An MjModel must list the textures that contain linear light in a tuple, see `sim.scene.linear_textures`
+        In an MjModel, a custom tuple must list the textures whose values are proportional to light (linear light), see
+        `sim.scene.linear_textures`
     data: initial poses; None: the model's reference pose
     bodies: names of the bodies whose geoms are included ("world" is the static body); None: all bodies
     groups: visible geom groups; a geom with alpha 0 is never visible
@@ -168,8 +169,8 @@ class Mirror:
 
         Raises:
             ValueError: the camera is unknown, or is not a perspective camera defined by `fovy`; the integrator or the
-                sampler is unknown, a number is not whole or out of range, a wavelength is outside 300 to 780 nm, or
-                Mitsuba would apply an argument incorrectly.
+                sampler is unknown, a number is not whole or out of range, a wavelength is outside 300 to 780 nm, the
+                description of "direct" sets its light samples, or the sampler cannot take `spp` samples.
         """
         view = self.viewpoint(camera)
         width, height = rays.checked_size(width, height)
@@ -182,7 +183,7 @@ class Mirror:
             return taken.radiance(integrator, spp, asked, seed, sampler)
 
     def _warn_of_glass(self) -> None:
-        """Warn once about transparent geoms, behind which Mitsuba's `direct` shows only emitters."""
+        """Warn once that Mitsuba's integrator "direct" shows only emitters behind the model's transparent geoms."""
         glass = [int(g) for g in self.geoms if surfaces.rgba(self.model, int(g))[3] < 1]
         if glass and not self._has_warned_of_glass:
             listed = inventory.listed_geoms(self.model, glass)

@@ -1,7 +1,7 @@
 """Hash of a MuJoCo model. It is the key under which values that were computed from the model are stored.
 
-The animals of a search are evaluated in equal worlds. Values that depend only on the world are computed for the first
-animal and kept for all others.
+The animals of a search are evaluated in identical worlds. Values that depend only on the world are computed for the
+first animal and kept for all others.
 """
 
 from __future__ import annotations

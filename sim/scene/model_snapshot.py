@@ -1,4 +1,7 @@
-"""Snapshot of a renderer's model. It refuses worlds that differ from the model in ways the renderer cannot show."""
+"""Snapshot of a renderer's model, which is compared with the rendered worlds.
+
+If a world differs from the model in a way that the renderer cannot show, the world is refused.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +62,7 @@ class ModelSnapshot:
         self._counts = self._that_count()
 
     def _that_count(self) -> dict[str, list[int]]:
-        """Return the ids of the materials, lights and height fields that must not differ between a world and the model.
+        """Return the ids of materials, lights and height fields whose values must be the same in worlds and model.
 
         The result is a dictionary. A key is the name of a field of `Poses`, for example "mat_rgba". The entry lists
         the ids of the elements for which this field must have the same value in every rendered world as in the model.
@@ -138,7 +141,10 @@ class ModelSnapshot:
                 raise ValueError(f"geom {name!r} has a material other than {listed}, see `varied`")
 
     def _refuse_what_appears(self, poses: Poses) -> None:
-        """Refuse hidden geoms whose alpha is now positive. The alpha of materials has already been compared."""
+        """Refuse geoms whose alpha was 0 when the renderer was made and is positive now.
+
+        `refuse_differences` calls this after it has refused worlds in which a material's alpha differs from the model.
+        """
         if not len(self._hidden) or not (self._differing(poses, "geom_rgba") + self._differing(poses, "geom_matid")):
             return
         rgba, material = (

@@ -74,14 +74,14 @@ class ReferencePose:
 
 
 class MovedBodies(Poses):
-    """Poses of worlds in which all bodies are in the reference pose, except the moved ones.
+    """Poses of worlds that differ from a reference pose only in the poses of some bodies, the moved bodies.
 
     reference: the model in its reference pose, and the ids of the moved bodies
     positions: positions of the moved bodies [m], (world, body, 3)
-    rotations: rotations of those moved bodies that may turn, (world, turning body, 3, 3). They precede the others in
-        the list of moved bodies
-    models: model of each world, if sizes, colours or materials of geoms differ between worlds; None: they are the same
-        as in the renderer's model
+    rotations: rotations of those moved bodies that may turn, (world, turning body, 3, 3). In the list of moved bodies,
+        the bodies that may turn come before those that may not
+    models: model of each world, if sizes, colours or materials of geoms differ between worlds; None: all worlds have
+        the sizes, colours and materials of the renderer's model
     """
 
     reference: ReferencePose

@@ -60,7 +60,8 @@ class Poses:
         (world, geom)
     mat_rgba, mat_emission, light_diffuse, light_active: properties of materials and lights; the first axis is the world
     heights: a checksum of the heights of each height field, (world, hfield)
-    others: a checksum of each field in OTHERS and in HEADLIGHT, (world, field)
+    others: a checksum of each other field of the model on which appearances depend, such as `geom_type` and the
+        `diffuse` of the headlight, (world, field). The constants OTHERS and HEADLIGHT list the fields
 
     Raises:
         ValueError: an array has half precision or less.
@@ -130,8 +131,8 @@ class Poses:
     def geom_turns(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
         """Return the rotations of these geoms, (world, geom, 3, 3).
 
-        The result may share memory with the poses. If no geom turns, it may be (1, geom, 3, 3), and the same object at
-        every call.
+        The result may share memory with the poses. If no geom turns, the result may have the shape (1, geom, 3, 3), and
+        every call may return the same array.
         """
         return self.geom_xmat[:, geoms]
 

@@ -30,7 +30,10 @@ REACH: dict[mujoco.mjtGeom, Callable[[np.ndarray], np.ndarray]] = {
 
 
 def kind_of(model: mujoco.MjModel, geom: int) -> str | None:
-    """Return the name of a geom's primitive; None for other kinds, and for textured geoms other than planes."""
+    """Return the name of the primitive shape that a geom is, such as "box".
+
+    Return None if the geom is not a primitive (for example, a mesh), or if it has a texture and is not a plane.
+    """
     if surfaces.geom_type(model, geom) == _TYPES.mjGEOM_PLANE:
         return PLANE
     return None if shapes.is_textured(model, geom) else KINDS.get(surfaces.geom_type(model, geom))

@@ -1,7 +1,7 @@
 """Rays of a sensor through a scene: radiance at given wavelengths, and first hits at the pixels' centres.
 
-Faces that MuJoCo does not draw are skipped. The functions use the types of the active variant: whole wavefronts, or one
-ray at a time in a scalar variant.
+Faces that MuJoCo does not draw are skipped. The functions use the types of Mitsuba's active variant: arrays of many
+rays or, in a scalar variant, one ray at a time.
 """
 
 from __future__ import annotations

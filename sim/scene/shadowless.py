@@ -22,7 +22,10 @@ _CLOSE = 1e-5
 
 
 def shadowless(light: Description) -> Description:
-    """Return an emitter with the light of `light` (a directional, point or spot emitter) that casts no shadows."""
+    """Return an emitter that emits the same light as the emitter `light`, but casts no shadows.
+
+    light: a directional, point or spot emitter
+    """
     _register(str(mi.variant()))
     return {"type": "shadowless", INNER: light}
 
@@ -39,8 +42,8 @@ def _register(variant: str) -> None:
     class Shadowless(mi.Emitter):
         """An emitter that has the light of another emitter, but casts no shadow.
 
-        The point that an integrator samples on the emitter is moved to right above the illuminated surface, so that
-        nothing can be in between.
+        When an integrator samples a point on the emitter, this class places the point directly above the illuminated
+        surface, so that nothing can be in between.
         """
 
         def __init__(self, props: Any) -> None:

@@ -101,9 +101,10 @@ def _is_cubic(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def uv_transform(model: mujoco.MjModel, geom: int) -> np.ndarray | None:
-    """Return the matrix (3, 3) from a shape's Mitsuba texture coordinates to MuJoCo's, including repeats.
+    """Return the matrix (3, 3) that converts Mitsuba's texture coordinates of a shape to MuJoCo's.
 
-    Return None if the triangles already have MuJoCo's coordinates, or if no texture needs them.
+    The matrix takes into account how often the texture repeats. Return None if the triangles already have MuJoCo's
+    coordinates, or if no texture is visible on the geom.
     """
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
     if not is_textured(model, geom) or _is_cubic(model, geom):
@@ -150,7 +151,7 @@ def parts(model: mujoco.MjModel, geom: int, lift: float = 0.0) -> list[Part]:
 
 
 def lifted_size(kind: mujoco.mjtGeom, lift: float) -> np.ndarray:
-    """Return the increase of a primitive's `geom_size` if its surface moves outwards by `lift` [m], (3,)."""
+    """Return what must be added to a primitive's `geom_size` to move its surface outwards by `lift` [m], (3,)."""
     return lift * np.array([1, kind != _TYPES.mjGEOM_CAPSULE, 1])
 
 

@@ -47,10 +47,12 @@ def description(model: mujoco.MjModel, white: float) -> Description | None:
 
 
 def _panorama(image: np.ndarray) -> np.ndarray:
-    """Return the latitude-longitude image (rows, 2 rows, 3) of a padded cube image.
+    """Return the latitude-longitude image (rows, 2 rows, 3) of a cube texture.
 
-    The left edge of the image is at the direction -z of Mitsuba's frame, and the columns continue towards +x. Rows run
+    The left edge of the result is at the direction -z of Mitsuba's frame, and the columns continue towards +x. Rows run
     from +y to -y. The centres of the first and the last row are on the poles.
+
+    image: the faces of the cube texture, stacked vertically, each with a border (`cube.padded`)
     """
     pitch = image.shape[1]
     rows = min(MAX_ROWS, 2 * (pitch - 2 * cube.BORDER))

@@ -39,7 +39,7 @@ class Solid:
 
 
 def solids_of(model: mujoco.MjModel) -> tuple[Solid, ...]:
-    """Return all geoms that eyes can see with the default groups, in the model's order."""
+    """Return all geoms that eyes can see by default (in the geom groups 0, 1 and 2), in the model's order."""
     return tuple(_solid(model, g) for g in surfaces.visible(model, VISIBLE_GROUPS) if shapes.has_shape(model, g))
 
 

@@ -66,7 +66,7 @@ def with_compiled_color_spaces(source: Source) -> Source:
 
 
 def _specification(source: mujoco.MjSpec | str | Path) -> tuple[Callable[[], mujoco.MjSpec], str]:
-    """Return a function that reads the specification (MjSpec) of a model, and the name of `source` in messages.
+    """Return a function that reads a model's specification (MjSpec), and the text that names `source` in errors.
 
     source: an MjSpec, MJCF text, or the path of a file
 
@@ -95,9 +95,9 @@ def _checked(compile_it: Callable[[], mujoco.MjModel], name: str) -> mujoco.MjMo
 
 
 def _reported(make: Callable[[], Made], name: str) -> Made:
-    """Return the result of `make`; raise an error of MuJoCo as a ValueError with a message of one line.
+    """Call `make` and return its result; raise an error of MuJoCo as a ValueError with a message of one line.
 
-    name: the source's name in messages
+    name: text that names the source of the model in the message
     """
     try:
         return make()

@@ -55,7 +55,7 @@ def _resolved(name: str, value: Any, materials: list[str], lights: list[str]) ->
 
 
 def of_geom(model: mujoco.MjModel, geom: int, spectra: Spectra) -> Spectrum | None:
-    """Return the reflectance of a geom's material; None if the geom has no material or `spectra` do not contain it."""
+    """Return the reflectance of a geom's material; None if it has no material, or one that is not in `spectra`."""
     material = int(model.geom_matid[geom])
     return spectra.get(model.material(material).name) if material >= 0 else None
 

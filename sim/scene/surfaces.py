@@ -110,7 +110,10 @@ def texture_repeat(model: mujoco.MjModel, geom: int, size: np.ndarray) -> np.nda
 
 
 def faces_of(model: mujoco.MjModel, texture: int) -> int:
-    """Return the number of square images in a cube texture: 6, or 1 if all sides share it; 0 for a 2-D texture."""
+    """Return the number of square images in a cube texture; 0 for a 2-D texture.
+
+    The number is 6, or 1 if all sides of the cube show the same image.
+    """
     if model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D:
         return 0
     return int(model.tex_height[texture] // model.tex_width[texture])
@@ -147,8 +150,9 @@ def reflectance_texture(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | No
 
 
 def bitmap(values: np.ndarray, to_uv: np.ndarray | None) -> Description:
-    """Return the repeating Mitsuba texture of a linear image (height, width, 1 or 3), row 0 at the top.
+    """Return a Mitsuba texture that repeats an image periodically.
 
+    values: the image in linear light (not sRGB-encoded), with row 0 at the top, (height, width, 1 or 3)
     to_uv: matrix from the shape's texture coordinates to MuJoCo's, (3, 3); None: they are equal
     """
     # A bitmap that is passed as an object has its first row at v = 0, as in MuJoCo. (Mitsuba would interpret a bitmap's

@@ -40,9 +40,9 @@ class Triangles:
         return self if self.uv is None else replace(self, uv=self.uv * repeat)
 
     def lifted(self, distance: float) -> Triangles:
-        """Return the same triangles, with each face moved outwards by at least about `distance` [m].
+        """Return the same triangles, with each face moved outwards by `distance` [m] or more.
 
-        Faces that met before still meet.
+        Faces may fall short of `distance` by about a tenth of it. Faces that met before still meet.
         """
         if distance == 0:
             return self
@@ -115,8 +115,8 @@ def box(half_size: np.ndarray) -> Triangles:
 def strip(half_sides: np.ndarray) -> Triangles:
     """Return a horizontal rectangle, divided into pieces along its longer side.
 
-    The piece in the middle is a square. Each other piece is at most as long as its distance from the middle.
-    (u, v) = ((x/sx + 1)/2, (y/sy + 1)/2).
+    The piece in the middle is a square. Each other piece is at most as long as its distance from the middle. The
+    texture coordinates of the point (x, y) are u = (x/sx + 1)/2 and v = (y/sy + 1)/2.
 
     half_sides: half lengths (sx, sy) of the sides [m], (2,)
     """

@@ -40,10 +40,12 @@ Drawn = float | np.ndarray | str
 class Variation:
     """Ranges of the quantities that differ between episodes.
 
-    ranges: (low, high) by name: "light" (a factor of all lights), "color_temperature" of the light [K], and "NAME.size"
-        (a factor), "NAME.color" (display-referred, 0 to 1) or "NAME.start" ([m], or [rad] for a hinge) of objects. For
-        colours and points in space, low and high have three numbers each, and are opposite corners of a box. If low =
-        high, the value is the same in all episodes. "NAME.material": names of materials; one is drawn.
+    ranges: (low, high) for each quantity, by the quantity's name. Quantities of the light are "light" (a factor by
+        which all lights are multiplied) and "color_temperature" [K]. Quantities of the object NAME are "NAME.size" (a
+        factor), "NAME.color" (display-referred, 0 to 1) and "NAME.start" (initial position [m], or [rad] for a hinge).
+        For colours and points in space, low and high have three numbers each, and are opposite corners of a box. If
+        low = high, the value is the same in all episodes. "NAME.material" has names of materials instead of (low,
+        high); one of them is drawn.
 
     Raises:
         ValueError: a name is unknown, or a range is invalid.
@@ -69,7 +71,7 @@ class Variation:
                 raise ValueError(f"vary: {name} = {given!r}: must be (low, high), low first")
 
     def draw(self, random: np.random.Generator) -> dict[str, Drawn]:
-        """Draw values for one episode, by the names of the ranges.
+        """Return random values for one episode, in a dictionary with the same keys as `ranges`.
 
         Factors of light and of sizes are distributed uniformly in their logarithm. Temperatures are distributed
         uniformly in their reciprocal (mired), in which equal steps look equally large. Each component of a colour or a
@@ -94,7 +96,7 @@ class Variation:
         return found
 
     def blank(self, n: int) -> dict[str, np.ndarray]:
-        """Return arrays for the drawn values of n worlds, by the names of the ranges.
+        """Return arrays for the drawn values of n worlds, in a dictionary with the same keys as `ranges`.
 
         An array contains numbers, (n,) or (n, 3), or names of materials, (n,).
         """
@@ -104,9 +106,9 @@ class Variation:
         }
 
     def of_things(self, what: str) -> dict[str, str]:
-        """Return the keys of `ranges` that belong to one quantity, by the names of the objects that have it.
+        """Return a dictionary from names of objects to those keys of `ranges` that belong to one quantity.
 
-        For "size", an example is {"ball": "ball.size"}.
+        For the quantity "size", an example is {"ball": "ball.size"}.
 
         what: the quantity: "size", "color", "material" or "start"
         """
@@ -144,8 +146,8 @@ class Variation:
         Only the ranges "light" and "color_temperature" are used, each at its low and its high limit. All factors are 1
         if light does not vary. The maximum over the whole array is the largest factor that the ranges permit. The
         maximum of a single band may be too small: a temperature inside its range may give a larger factor in this band
-        than both limits. If the range extends from warm to cold light, the factor may be larger by up to a third. The
-        array has the shape (combination, band).
+        than both limits. If the range extends from warm to cold light, this factor may exceed the band's maximum in the
+        array by up to a third. The array has the shape (combination, band).
 
         wavelengths: centres of the bands [m], (band,)
         """
@@ -169,7 +171,9 @@ _FORM = {
 
 
 def kind_of(name: str) -> str:
-    """Return the quantity in a range's name: "light", "color_temperature", "size", "color", "material" or "start".
+    """Return the quantity that a key of `Variation.ranges` stands for; for example, "size" for "ball.size".
+
+    The quantity is "light", "color_temperature", "size", "color", "material" or "start".
 
     Raises:
         ValueError: the quantity is unknown.

@@ -84,7 +84,10 @@ class WorldModels:
         return not self.own and self.get_state(0) != self._compiled
 
     def noted(self) -> bytes:
-        """Return the current settings (`ModelSettings`) of the worlds' shared model; empty if they have their own."""
+        """Return the current settings (`ModelSettings`) of the model that all worlds share.
+
+        The result is empty if each world has its own model.
+        """
         return b"" if self.own else self.get_state(0)
 
     def require_unchanged(self, before: bytes, whose: str) -> None:
@@ -185,7 +188,7 @@ def _geom(model: mujoco.MjModel, thing: str, name: str) -> int:
 
 
 def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | None) -> tuple[str, Any]:
-    """Return the field of mjData that contains an object's place, and the indices of the place in this field.
+    """Return the name of the field of mjData that contains an object's position, and the object's indices in it.
 
     thing: name of the object, which is a joint or a body
     name: name of the range of the object's initial places, a key of `variation.ranges`
@@ -216,10 +219,12 @@ def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | 
 
 
 def _specification(given: Any) -> mujoco.MjSpec:
-    """Return a specification of the model `given`; it can be compiled again.
+    """Return the specification (MjSpec) of a model, which can be compiled repeatedly, with other sizes.
+
+    given: source of the model, see `sim.scene.source.load`
 
     Raises:
-        ValueError: `given` is a compiled model, or it does not give a specification.
+        ValueError: `given` is a compiled model, or no specification can be read from it.
     """
     if source.is_compiled(given):
         kind = "an MjModel" if isinstance(given, mujoco.MjModel) else "a compiled file"

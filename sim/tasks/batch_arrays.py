@@ -61,7 +61,11 @@ def mapping(where: str, returned: Any, right: str = "arrays by name, such as {'p
 
 
 def not_finite(where: str, terms: Mapping[str, np.ndarray]) -> dict[int, str]:
-    """Return an error message for each world in which a term is not finite, by the index of the world."""
+    """Return an error message for each world in which a term of the reward is not finite, by the world's index.
+
+    where: beginning of the messages
+    terms: terms of the reward by name, (n,) each
+    """
     found: dict[int, str] = {}
     for name, term in terms.items():
         for world in np.flatnonzero(~np.isfinite(term)).tolist():
@@ -73,8 +77,8 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
     """Check that the arrays of an outcome fit the number of worlds `n` and the number of learning agents.
 
     Raises:
-        ValueError: it is not an Outcome, an array has another shape or masked elements, a term is not finite, or the
-            outcome names worlds that do not exist.
+        ValueError: `outcome` is not an Outcome, an array has another shape or masked elements, a term of the reward is
+            not finite, or `outcome` names worlds that do not exist.
     """
     if not isinstance(outcome, Outcome) or not isinstance(outcome.terms, RewardTerms):
         raise ValueError(f"judge returned {shown(outcome)}: must be a sim.Outcome, whose terms are sim.RewardTerms")

@@ -66,8 +66,8 @@ class BatchTask(TaskSettings):
         not listed has no limits
     ramped: terms of the reward whose weight `evolve` reduces at the beginning of training if the setting
         `learning.contact_ramp` is above 0
-    counted: terms of the reward that reports count, each with the title of its row in a table. The row shows in how
-        many actions of an episode the term was not 0
+    counted: terms of the reward that are counted in reports: for each term, the title of its row in a report's table.
+        The row shows in how many actions of an episode the term was not 0
     compared_light: level of light (see `Fidelity`) with which `evolve` compares eyes, for example "direct"; None: the
         level in `fidelity`
     """
@@ -161,7 +161,10 @@ class BatchTask(TaskSettings):
         return None
 
     def commands(self) -> tuple[Command, ...]:
-        """Return the meaning of each number in the first agent's action. By default, the names are "0", "1" ..."""
+        """Return the meaning of each number in the first agent's action: a name, a unit and a scale.
+
+        By default, the names are "0", "1" ...
+        """
         return tuple(Command(str(number)) for number in range(self.agents()[0].n_actions))
 
     def solved(self, before: bool | None, info: Mapping[str, Any]) -> bool | None:

@@ -39,10 +39,13 @@ STANDING = (-1.0, 0.0)  # "previous action" at the start of an episode: no speed
 class AgentEvents:
     """Events during one action, per world.
 
+    In training, only the first event counts, because it ends the episode: `goal` is False if the agent reached an
+    adversary first, and `adversary` is False if the agent reached a goal first or at the same time.
+
     progress: progress as the task defines it [m], (n,)
-    goal: True if a goal was reached, (n,) bool; in training, False if an adversary was reached before it
-    adversary: True if an adversary was reached, (n,) bool; in training, False unless it was reached before any goal
-    adversary_first: True if an adversary was reached before any goal, (n,) bool
+    goal: True if a goal was reached, (n,) bool
+    adversary: True if an adversary was reached, (n,) bool
+    adversary_first: True if an adversary was reached, and no goal was reached before or at the same time, (n,) bool
     reached: True for objects that were reached, (n, k) bool
     terminated: True if the task ends the episode, (n,) bool
     """
@@ -120,7 +123,10 @@ class AgentTask(BatchTask):
         return (Command("speed", "m/s", MAX_SPEED / 2, 1.0), Command("turn", "°", np.degrees(MAX_TURN)))
 
     def solved(self, before: bool | None, info: Mapping[str, Any]) -> bool | None:
-        """Return whether a goal (or the goal region) was reached before any adversary; None if neither was reached."""
+        """Return True if the agent reached a goal (or the goal region) first, False if it reached an adversary first.
+
+        Return None if it has reached neither.
+        """
         if before is not None:
             return before
         if info.get("adversary_first"):

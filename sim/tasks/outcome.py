@@ -71,7 +71,7 @@ class RewardTerms:
 
     @property
     def rows(self) -> list[dict[str, float]]:
-        """Terms by name, for each row."""
+        """Values of the terms by name, a dictionary for each row. A row is one learning agent in one world."""
         if self._rows is not None:
             return self._rows
         # These dictionaries are built for every world in every step. This form takes a third of the time of a loop.
@@ -97,9 +97,10 @@ class Outcome:
     terms: terms of the reward
     terminated: True if the task ends the episode, (row,) bool
     success: True if the task is accomplished, (row,) bool
-    failure: the worlds that could not continue, by index, each with the reason; their episodes end
-    over: True if the task ends a world's episode without terminating a row, (world,) bool. An example is an end for an
-        animal that does not learn, and thus has no row. None: False in all worlds
+    failure: the worlds that could not continue, by index, each with the reason; the episodes of these worlds end
+    over: True if the task ends the episode of a world, even if `terminated` is False in all rows of this world,
+        (world,) bool. For example, an animal that does not learn may end the episode; such an animal has no row. None:
+        False in all worlds
     changed: indices of the worlds in which the task moved bodies after the action, (k,) int
     info: additional entries of each row's `info`; None: no additions
     proprioception: part of the observation that does not come from eyes, for each agent and by name, (world, value);

@@ -43,7 +43,8 @@ class _OfWorld:
 class PerWorld(BatchTask):
     """Task for many worlds at once, which calls the methods of a `sim.Task` or `sim.Encounter` world by world.
 
-    It has all animals of the encounter or, for a task, the task's own animal and its `others`.
+    Its animals are those of the encounter. For a `sim.Task`, they are the task's own animal and the animals in the
+    task's attribute `others`, which do not learn.
 
     task: the task or the encounter
     learners: tasks of the learning animals

@@ -1,6 +1,7 @@
-"""Random number generators ("streams") of the worlds, in two schemes.
+"""Random number generators ("streams") of the worlds.
 
-In both schemes, the episodes of a world do not depend on the number of worlds.
+There are two schemes: a generator for each world and purpose, or a generator for each world. In both schemes, the
+episodes of a world do not depend on the number of worlds.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ AHEAD = 64
 class RandomStreams(Protocol):
     """Protocol of the random number generators of all worlds.
 
-    entropy: seed of all generators; a simulation with this seed repeats every episode
+    entropy: seed of all generators; another simulation with this seed has the same episodes
     noise_keys: for each agent, keys of its receptors' noise (`sim.render.receptor_noise`), (kind of eyes, world) uint64
     """
 
@@ -52,7 +53,7 @@ class StreamsByPurpose:
 
     seed: a seed for all worlds, None for a random seed, or a tuple with a seed for each world
     n: number of worlds
-    kinds: number of kinds of eyes of each agent; the sequence has one number, because built-in tasks have one agent
+    kinds: number of kinds of eyes of each agent: a sequence of one number, because built-in tasks have one agent
 
     Attribute `motion`: random numbers for objects that move at random.
     """
@@ -89,7 +90,7 @@ class StreamsByPurpose:
 class StreamsByWorld:
     """One generator for each world, for all random numbers of the world's episodes except the receptors' noise.
 
-    User tasks use this scheme. The attribute `noise_keys` determines the receptors' noise.
+    User tasks use this scheme. The receptors' noise depends on this object's attribute `noise_keys` instead.
 
     seed, n: see `StreamsByPurpose`
     kinds: number of kinds of eyes of each agent
@@ -136,8 +137,9 @@ class MotionNoise:
     def get_state(self) -> dict[str, np.ndarray]:
         """Return the states of the generators, and the remaining numbers that were drawn in advance.
 
-        The array of numbers has the shape (world, action, 2, moving object), with 64 actions. The remaining numbers
-        are at the end of the axis of actions. All entries before them are NaN.
+        The array of numbers has the shape (world, action, 2, moving object), with 64 actions. On the axis of length 2,
+        a standard normal number comes first, then a uniform number in [-1, 1). The remaining numbers are at the end of
+        the axis of actions. All entries before them are NaN.
         """
         left, _, n, movers = self._drawn.shape
         ahead = np.full((n, AHEAD, 2, movers), np.nan)
@@ -147,11 +149,12 @@ class MotionNoise:
     def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
         """Restore the state of these worlds from the return value of `get_state`.
 
-        All worlds draw numbers for 64 actions in advance, and use them at the same pace.
+        All worlds draw numbers for 64 actions at the same time, and use those of one action per step. All worlds must
+        therefore have numbers left for equally many actions.
 
         Raises:
-            ValueError: only some worlds are restored, and the number of further actions for which random numbers have
-                been drawn differs between the restored state and the other worlds.
+            ValueError: only some worlds are restored, and `state` has numbers left for more or fewer actions than the
+                other worlds.
         """
         _set_states(self._generators, state["motion"], worlds)
         ahead = np.asarray(state["motion_ahead"])
@@ -167,9 +170,10 @@ class MotionNoise:
 
 
 def _roots(seed: Any, n: int) -> tuple[Any, list[tuple[Any, int]]]:
-    """Return the entropy of the whole batch, and an entropy and an index for each world.
+    """Return the entropy of the whole batch, and a pair (entropy, index) for each world.
 
-    A world's random streams are seeded with its entropy and its index (the first number of a SeedSequence's spawn key).
+    An entropy is the number, or the numbers, that a NumPy SeedSequence starts from. A world's random streams are seeded
+    with its entropy and its index (the first number of a SeedSequence's spawn key).
 
     seed: one seed, or a tuple with a seed for each world. With one seed, all worlds have the same entropy, and their
         indices differ. With a tuple, each world has its own seed as entropy and the index 0. A world with the seed s in

@@ -1,4 +1,4 @@
-"""Times at which an agent comes within reach of objects, and its distance from them."""
+"""Times at which an agent comes within reach of objects, and the agent's distance from the nearest goal."""
 
 from __future__ import annotations
 
@@ -47,5 +47,8 @@ def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: n
 
 
 def _on_the_ground(objects: np.ndarray) -> np.ndarray:
-    """Return the x and y coordinates of objects (n, k, 3) as an array (x | y, 1, k, n)."""
+    """Return the x and y coordinates of objects at positions (world, object, 3).
+
+    Shape: (2, 1, object, world), where the first axis is the coordinate, x or y.
+    """
     return objects.T[:2].copy()[:, None]

@@ -3,8 +3,8 @@
     reward_t = λ progress_t + w_g goal_t + w_a adversary_t + w_c contact_t
 
     progress   change of a distance in metres; x_t is the agent's position after action t:
-               |x_(t-1) - x_goal| - |x_t - x_goal|   detection, foraging, tracking; in each term, x_goal is the
-                                                     goal that is nearest at the time of that term
+               |x_(t-1) - x_goal| - |x_t - x_goal|   detection, foraging, tracking; in each of the two distances,
+                                                     x_goal is the goal that is nearest at that time, t-1 or t
                |x_t - x_start| - |x_(t-1) - x_start| navigation, maze; straight-line distances
     goal       1 when the goal, or the goal region of a course or maze, is reached
     adversary  1 when an adversary is reached
@@ -20,8 +20,8 @@ Evolution". The fitness is the mean, over all evaluation episodes, of the sum of
 code published with the paper gives a metre of progress the same weight as an action during which the agent touches a
 wall; rhabdom uses the weights of the text. Foraging is not in the paper and has the reward of detection. A training run
 may begin with a w_c closer to 0 (setting `learning.contact_ramp` of `evolve`). At the end of training, and in the
-fitness, the weights are those above. `sim.tasks.find_goal` and `sim.tasks.find_way` compute the progress, and find out
-whether a goal or an adversary is reached.
+fitness, the weights are those above. The progress, and whether a goal or an adversary is reached, are computed by
+`sim.tasks.find_goal` for detection, foraging and tracking, and by `sim.tasks.find_way` for navigation and maze.
 """
 
 from __future__ import annotations

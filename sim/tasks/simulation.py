@@ -37,13 +37,13 @@ class Simulation:
 
     Further attributes:
     physics: physics of the worlds
-    agents: agents in each world, learners first
+    agents: agents in each world; those that learn come first
     task_name: name of the task in messages
     rows: number of learners in all worlds together
     steps: number of actions taken in the present episode of each world, (n,)
-    varied: current values of the varied quantities in each world, by name
+    varied: current values, in each world, of the quantities that differ between episodes (`task.vary`), by name
     taken: the last actions, limited to [-1, 1]; `Agent.first_action` replaces actions that were not finite
-    felt: the last proprioception of each agent, as arrays (n, k) float32 by name
+    felt: for each agent, the part of its last observation that is not from eyes, as arrays (n, k) float32 by name
 
     Raises:
         ValueError: `n` is below 1, or `least_return` is 0 or more, or it is given in a mode other than training.
@@ -179,9 +179,9 @@ class Simulation:
         )
 
     def _any_learner(self, rows: np.ndarray) -> np.ndarray:
-        """Return for each world whether a condition holds for any of its learners, (n,) bool.
+        """Return for each world whether a condition holds for at least one of the world's learners, (n,) bool.
 
-        rows: True where it holds: for the first learner in all worlds, then for the next learner, (learners · n,) bool
+        rows: True where the condition holds: first learner in all worlds, then the next one, (learners · n,) bool
         """
         return rows if self.learners == 1 else np.asarray(rows.reshape(self.learners, self.n).any(axis=0))
 

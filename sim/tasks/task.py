@@ -27,8 +27,8 @@ class Task(TaskSettings):
         the same model. At the start of an episode, `reset` of every animal is called in turn. As soon as `terminated`
         of one animal returns True, the episode ends for all animals; for the other animals it counts as truncated.
 
-    If eyes evolve for this task (`evolve run FILE.py:CLASS`), every candidate has its own eyes, at the mounts that
-    `place` returns. The class must then have no required arguments.
+    If `evolve` optimizes the eyes for this task (`evolve run FILE.py:CLASS`), every candidate has its own eyes, at the
+    mounts that the task's method `place` returns. The class must then have no required arguments.
 
     If a method raises an exception or returns an invalid value, the episode of this world ends, and `info["failure"]`
     is the reason. In contrast, an error in `reset`, or in `proprioception` during a reset, ends the simulation of all
@@ -42,9 +42,10 @@ class Task(TaskSettings):
     others: Sequence[Frozen] = ()
 
     def reset(self, data: mujoco.MjData, rng: np.random.Generator) -> None:
-        """Change the state after mj_resetData at the start of an episode; by default, keep it.
+        """Set the state of the world at the start of an episode.
 
-        A change of `data.model` applies to this episode only.
+        This method is called after mj_resetData. By default, it leaves the state as mj_resetData set it. A
+        change of `data.model` applies to this episode only.
 
         rng: random number generator of the world
         """
@@ -65,11 +66,14 @@ class Task(TaskSettings):
         raise NotImplementedError
 
     def terminated(self, data: mujoco.MjData) -> bool:
-        """Return whether the episode ends after this action; None counts as False."""
+        """Return whether the episode ends after this action. If a task returns None here, this counts as False."""
         return False
 
     def succeeded(self, data: mujoco.MjData) -> bool:
-        """Return whether the task is accomplished; None counts as False. This is `info["is_success"]`."""
+        """Return whether the task is accomplished. If a task returns None here, this counts as False.
+
+        The result is stored as `info["is_success"]`.
+        """
         return False
 
     def proprioception(self, data: mujoco.MjData) -> np.ndarray:

@@ -1,6 +1,7 @@
-"""Rendering fidelity of the eyes in a task.
+"""Fidelity of the eyes in a task: the accuracy with which their images are rendered.
 
-The task sets it. With the setting "auto", it is chosen by trial renderings of a few moments of the task's episodes.
+The task's setting `fidelity` states it. If the setting is "auto", the fidelity is chosen by trial renderings of a few
+moments of the task's episodes.
 """
 
 from __future__ import annotations
@@ -113,10 +114,10 @@ def resolve_other_fidelities(task: Task) -> Task:
 
 
 def _in_brightest(variation: Variation, eye: WorldEye) -> float:
-    """Return the allowed error of a signal in the model, reduced if episodes may have more light than the model.
+    """Return the allowed error of an eye's signal in renderings with the model's own, unvaried lights.
 
-    The error is divided by the largest factor by which an episode may multiply the lights, if this factor is above 1,
-    because errors are proportional to the light.
+    Errors are proportional to the light, and episodes may multiply the lights. If the largest such factor is above 1,
+    the allowed error is divided by it, so that the error is also small enough in the brightest episode.
     """
     most = variation.extremes(np.asarray(eye.spectral_bands.wavelengths)).max()
     return allowed_error(eye, None) / max(float(most), 1.0)

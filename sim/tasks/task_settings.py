@@ -34,8 +34,8 @@ class TaskSettings:
     model: an MjModel, or a source from which `sim.mirror` can compile one
     eye: optics and retina of every eye, an `optics.Eye`; or a compound eye, a `sim.CompoundEye`
     mounts: places of the eyes, one or more `sim.Mount`. If an animal has several kinds of eyes, `eye` and `mounts` are
-        dictionaries, such as {"wide": ..., "sharp": ...}. An observation then has an array for each kind instead of
-        "eyes".
+        dictionaries, such as {"wide": ..., "sharp": ...}. An observation then has an entry for each kind, such as
+        "wide", instead of the single entry "eyes".
     fidelity: rendering fidelity of the eyes, see `sim.ModelRenderer`; "auto": `sim.choose_model_fidelity` chooses it
         from a few scenes of the task's episodes. If an animal has several kinds of eyes, give one fidelity for all of
         them, or a dictionary with a fidelity for each kind.
@@ -54,7 +54,8 @@ class TaskSettings:
         "GEOM.material": names of materials of the model. The geom gets the texture, colour and emission of one of
         them. The geom must not have an rgba of its own.
         "JOINT.start": initial position of a hinge [rad] or a slide [m].
-        "BODY.start": initial position between two points (x, y, z) [m], of a mocap body or a body with a free joint.
+        "BODY.start": initial position of a mocap body or a body with a free joint [m], in the box between two points
+        (x, y, z).
         Starting positions are set in the world's data. Sizes, colours and materials are set in `data.model`, and each
         world then has its own copy of the model. Each world also has a copy of the model if the first `reset` changes
         `data.model`. Otherwise all worlds share one model.
@@ -99,7 +100,8 @@ class TaskSettings:
     def n_actions(self, model: mujoco.MjModel) -> int:
         """Return the number of values in an action.
 
-        The default is the number of controls of the task's actuators. Most actuators have one control.
+        Unless a subclass overrides this method, it is the number of controls of the task's actuators. Most actuators
+        have one control.
 
         Raises:
             KeyError: the model lacks an actuator of the task.

@@ -49,11 +49,11 @@ def require_rewards(task: Task | BatchTask) -> None:
 def with_evolved_eyes(task: UserTask, eyes: Eyes, elevation_deg: float = 0.0) -> UserTask:
     """Return a copy of the task for an animal with these eyes. The task's method `place` decides where they sit.
 
-    It returns a mount for each eye: the eye's position and direction on the body.
+    The method returns a mount for each eye: the eye's position and direction on the body.
 
     Raises:
-        ValueError: `place` fails or returns another number of mounts, or the task has no mounts or several kinds of
-            eyes.
+        ValueError: `place` fails or does not return one mount for each eye, the task has several kinds of eyes, or it
+            has neither mounts nor its own `place`.
     """
     name, animal = type(task).__name__, copy.copy(task)
     if several(task):

@@ -1,11 +1,11 @@
 """A ray tracer in closed form for worlds of upright walls, a floor and spheres.
 
 If there are only a few walls, they are intersected one by one. Otherwise, a ray walks through a grid in which each wall
-fills whole cells (Amanatides and Woo 1987). Reflectances are Mitsuba's (`sim.tracing.reflectance_atlas`). Light is
-traced in components. In a medium and for compound eyes, the components are the bands. Otherwise, there are fewer
-components if all lights share one spectrum and the materials' spectra are linear combinations of a few spectra. Each of
-these few spectra is then a component. After two reflections, the spectrum of light is a product of two materials'
-spectra, so all bands are traced, unless all materials are grey and all lights share one spectrum.
+fills whole cells (Amanatides and Woo 1987). Reflectances are computed by Mitsuba (`sim.tracing.reflectance_atlas`).
+Light is traced in components. For a compound eye, and in a medium for any eye, each component is one spectral band.
+Otherwise, there are fewer components if all lights share one spectrum and the materials' spectra are linear
+combinations of a few spectra, which are then the components. After two reflections, the spectrum of light is a product
+of two materials' spectra, so all bands are traced, unless all materials are grey and all lights share one spectrum.
 """
 
 from __future__ import annotations
@@ -81,12 +81,12 @@ class ClosedFormSurroundings:
 class ClosedForm:
     """A tracer of rays through one scene of upright walls, a floor and spheres.
 
-    scene, wavelengths: the scene, and the centres of the eye's bands [m]
+    wavelengths: centres of the eye's bands [m]
     name, why: name of the tracer, and the reason for its choice, for reports
     light: how often light is reflected: "direct" (once), "bounce" (up to twice) or "all" (any number of times)
     basis: contribution of each component of the light to each band, (component, band)
-    world, walls, lights: the scene, its walls and its lights
-    footprints, components: method of intersecting walls, and spectra (bands or fixed ones) in which light is traced
+    world, walls, lights: the argument `scene`, its walls and its lights
+    footprints, components: method of intersecting walls; bands, or spectra of fixed shape, in which light is traced
     medium: water or air between surfaces and eyes; None: clear air
     faces: textures of walls and floor, see `face_rows`
     sphere_textures: for each sphere that rays can hit, the map from texture coordinates to texels, and the place of its
@@ -94,7 +94,7 @@ class ClosedForm:
 
     Raises:
         NoClosedForm: there are many walls, and some overlap or do not fit a grid. There are further reasons if light is
-            reflected more than once: walls have several heights or are lower than a body, a body may change its height,
+            reflected more than once: walls have several heights or are lower than a body, a body may move up or down,
             or the body that carries the eyes has a texture.
     """
 
@@ -163,7 +163,7 @@ class ClosedForm:
     def returned(self, ray: Array, shade: Array, radius: float, more: Irradiance | None = None) -> list[Array]:
         """Return the light that walls and floor reflect to the rays' origins, per component (band or fixed spectrum).
 
-        They receive direct light, which the sphere at `shade` may block, and the irradiance `more`, if given.
+        Walls and floor receive `more`, if given, and direct light that the sphere with centre `shade` does not block.
         """
         hit = self._hit(ray, [], self.inputs)
         light = self._irradiance(hit, [shade], self.inputs, [radius])
@@ -207,7 +207,7 @@ class ClosedForm:
     def _irradiance(
         self, hit: _Hit, bodies: list[Array], tables: ClosedFormTables, radii: list[float] | None = None
     ) -> list[Array]:
-        """Return the irradiance at hits due to unobstructed lights, per component of light (band or fixed spectrum).
+        """Return the irradiance at hits due to unobstructed lights, per component (band or spectrum of fixed shape).
 
         radii: radii of the bodies that cast shadows [m]; None: those of the scene
         """
@@ -258,7 +258,7 @@ class ClosedForm:
 
 
 def _check_tops(scene: UprightScene) -> None:
-    """Refuse scenes if light may hit a wall's top, a body may change its height, or the eyes' body has a texture."""
+    """Refuse scenes if light may hit a wall's top, a body may move up or down, or the eyes' body has a texture."""
     for geom, settled in zip(scene.bodies.geoms, scene.settled, strict=True):
         if not settled:
             raise NoClosedForm(f"geom {scene.model.geom(geom).name or str(geom)!r} may change its height")
@@ -275,8 +275,8 @@ def _check_tops(scene: UprightScene) -> None:
 def face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
     """Return a row of 12 numbers for each face, from which the texel at a point is computed.
 
-    A row contains two affine functions, from which the texel's column and row at a point (x, y, z, 1) follow. The
-    texture's place in the atlas and a 0 come after them.
+    A row contains two affine functions for the texel's column and row at a point (x, y, z, 1), the index of the
+    texture's first texel, the texture's numbers of columns and rows, and an unused 0.
 
     uv: matrices (2, 4) from points of each face to texture coordinates, (face, 2, 4)
     place: index of each face's texture in the atlas, (face,)

@@ -17,7 +17,10 @@ _SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HIN
 
 
 class NotLevelError(ValueError):
-    """The eyes are not fixed to one body that stays upright. The message states the reason."""
+    """The eyes are not all fixed to the same body, or this body may tilt or change its height.
+
+    The message states the reason.
+    """
 
 
 class EyeFrames(NamedTuple):
@@ -91,7 +94,7 @@ class EyePlaces:
         return len(self.mounts)
 
     def frames(self, poses: Poses) -> EyeFrames:
-        """Return the eyes' frames in the world."""
+        """Return the positions and orientations of the eyes in all worlds."""
         origins, rotations = np.empty((poses.n, len(self), 3)), np.empty((poses.n, len(self), 3, 3))
         for k, ((kind, index), (offset, turn)) in enumerate(zip(self._things, self._locals, strict=True)):
             origin, rotation = poses.frames(kind, index)

@@ -68,7 +68,7 @@ def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Compo
 
 
 def components_in_bands(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components of light that are the spectral bands themselves.
+    """Return one component of light for each spectral band.
 
     Light that crosses a medium or is reflected several times generally needs all bands.
 

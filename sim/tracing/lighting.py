@@ -37,9 +37,9 @@ class DirectionalLight:
 
 
 def spectra(wavelengths: np.ndarray) -> list[Array]:
-    """Return the bands' wavelengths [m] as a list of Mitsuba spectra [nm], each with 4 wavelengths.
+    """Return the wavelengths [m] of the bands in groups of 4. Each group is a Mitsuba spectrum of wavelengths in nm.
 
-    Copies of the last wavelength fill the rest of the last spectrum.
+    If the last group is not full, the last wavelength is repeated.
     """
     padded = np.pad(wavelengths * 1e9, (0, -len(wavelengths) % LANES), mode="edge")
     return [mi.Spectrum(*map(float, chunk)) for chunk in padded.reshape(-1, LANES)]

@@ -32,7 +32,7 @@ class MediumOnRays:
 
     @classmethod
     def from_bands(cls, medium: BandMedium, basis: np.ndarray) -> MediumOnRays:
-        """Return the medium for a tracer in which each component of light is one spectral band times a factor.
+        """Return the medium for a tracer whose components of light are the spectral bands, each multiplied by a factor.
 
         basis: matrix with these factors on its diagonal and 0 elsewhere, (component, band)
         """
@@ -49,7 +49,7 @@ class MediumOnRays:
         return [v + more for v, more in zip(self.veil, self.contrasts(radiance, [distance]), strict=True)]
 
     def contrasts(self, radiance: Sequence[Array], distances: Sequence[Array], share: Array | float = 1) -> list[Array]:
-        """Return a surface's contrast with the veiling light, as it arrives at the eye, one array per spectral band.
+        """Return a surface's contrast with the veiling light, reduced by the way to the eye, one array per band.
 
         The contrast is share · (L - V) exp(-c d), with the surface's radiance L and distance d, the veiling light V and
         the medium's attenuation coefficient c.
@@ -68,11 +68,11 @@ class MediumOnRays:
     def reflected_contrasts(
         self, reflectance: Sequence[Array], light: Sequence[Array], distances: Sequence[Array]
     ) -> tuple[list[Array], list[Array]]:
-        """Return two factors for each spectral band: a surface's contrast with the veiling light, and 1.
+        """Return a surface's contrast with the veiling light for each spectral band, and a list of as many ones.
 
         The contrast is (reflectance · light - veiling light) · transmission of the medium. Without a medium, a caller
-        multiplies the light on the surface by the reflectance. With a medium, the same code multiplies the two factors:
-        the contrast in place of the light, and 1 in place of the reflectance.
+        multiplies the light on the surface by the reflectance. With a medium, the same code multiplies the two returned
+        lists: the contrasts in place of the light, and the ones in place of the reflectance.
 
         light: light on the surface, one array per spectral band
         distances: distances from the eye [m], over which the transmission is averaged

@@ -1,4 +1,4 @@
-"""All moving meshes in one Mitsuba scene, in which a kernel intersects each of them separately.
+"""All moving meshes in one Mitsuba scene, in which a kernel finds the hits of rays with each mesh separately.
 
 Every mesh is scaled to a ball of radius 1 in a separate cell. A ray is traced only inside a ball of radius 1.1, so it
 cannot hit another mesh. A kernel therefore needs one scene and one loop for any number of meshes, and moving a mesh

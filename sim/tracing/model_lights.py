@@ -74,9 +74,10 @@ def model_lights(
 
 
 def _sampled(description: Description, wavelengths: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return a directional light's irradiance and the direction towards it, or another light's intensity and None.
+    """Return the strength of a light at these wavelengths [m] and, if it is directional, the direction towards it.
 
-    The irradiance or intensity is (band,), at these wavelengths [m]; the direction is a unit vector (3,).
+    The strength is the irradiance of a directional light or the intensity of another light, (band,). The direction is a
+    unit vector (3,), or None for a light that is not directional.
     """
     emitter, found = mi.load_dict(description), []
     directional, towards = description["type"] == _DIRECTIONAL, None
@@ -92,7 +93,7 @@ def _sampled(description: Description, wavelengths: np.ndarray) -> tuple[np.ndar
 
 
 class Lights:
-    """All lights of a model, for the kernel, which evaluates each of them once per ray."""
+    """All lights of a model. The renderer's kernel evaluates each of them once per ray."""
 
     def __init__(self, found: list[ModelLight]) -> None:
         self.found = found
@@ -111,14 +112,14 @@ class Lights:
         return rows.reshape(poses.n, len(self), -1)
 
     def towards(self, k: int, point: Array, axis: Array, there: WorldRows) -> tuple[Array, Array, Array]:
-        """Return the unit vector from a point to a light, the distance [m], and the light's relative strength there.
+        """Return the unit vector from a point to a light, the distance [m], and the light's relative strength.
 
         The relative strength, times the light's `level`, is the irradiance of a surface that is at the point and faces
         the light. The distance to a directional light or a headlight is a large constant.
 
         k: index of the light
         axis: axis of the observing eye
-        there: positions and directions of all lights in the world of the ray, see `rows`
+        there: positions and directions of all lights in the world that contains the point, see `rows`
         """
         light = self.found[k]
         if light.light < 0:

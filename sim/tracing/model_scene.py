@@ -60,7 +60,7 @@ class ModelScene:
     varied: geoms whose size, colour or material differs between worlds, with the ids of the materials that each may
         have. They are movers, even if they always stay in the same place
     coincidences: geoms in the same place in the model's reference pose
-    as_built: snapshot of the model, with which the models of worlds are compared
+    as_built: snapshot of the model, for comparison with the models of individual worlds
 
     Raises:
         ValueError: the model has no visible geoms, or lacks an element that `spectra` or `varied` names.
@@ -127,7 +127,7 @@ class ModelScene:
 
     @cached_property
     def as_built(self) -> ModelSnapshot:
-        """Snapshot of the model, with which the models of worlds are compared."""
+        """Snapshot of the scene's model, for comparison with the models of individual worlds."""
         model, groups = self.model, self._groups
         reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
         hidden = [g for g in reachable if g not in self._visible]

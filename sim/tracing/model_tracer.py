@@ -41,8 +41,8 @@ class Tables:
     """Arrays that are the same in all worlds. A moving geom is one "mover" for each material that it may have.
 
     bsdfs, painted: each mover's BSDF, and its geom's index among geoms whose colour differs between worlds (`Paint`)
-    ends: index of the first mover of each kind of geom, such as spheres, followed by the number of movers
-    sky, glows: emitter for the sky (None: no sky); BSDFs whose reflectance is a glowing geom's radiance (None: no glow)
+    ends: for each kind of geom, such as spheres, the index of its first mover; the number of movers comes last
+    sky, glows: the sky's emitter; BSDFs that yield the radiance of glowing geoms as a reflectance (each None if absent)
     glowing: for each mover, its index in `glows`, or len(glows) if it does not glow; None if no geom glows
     """
 
@@ -65,7 +65,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """All that a ray can meet in its world. Static geoms (`still`) and `tables` are the same in all worlds."""
+    """All that a ray can meet in its world. All worlds share the static geoms (`still`) and the arrays in `tables`."""
 
     still: MitsubaObject
     movers: MoverRows
@@ -102,8 +102,8 @@ class RowBuffers:
 class _SurfaceHit:
     """First hits of rays.
 
-    bsdf, si: BSDF of the hit surface; its argument, which is Mitsuba's description of the hit
-    colors, glow: factors that multiply the surface's reflectance and its emission, as spectra of 4 bands each
+    si, bsdf: Mitsuba's description of the hit, and the BSDF of the hit surface, which is evaluated with it
+    colors, glow: factors by which the surface's reflectance and its emission are multiplied, spectra of 4 bands each
     which: index of the hit moving geom in `Movers`, or len(Movers) if the ray hits no moving geom
     seen, active: seen is True for rays that hit a surface, active is True for rays that are traced
     point, normal, t, direction: hit point, normal towards the ray's origin, distance [m], and direction of the ray
@@ -123,11 +123,11 @@ class _SurfaceHit:
 
 
 class ModelTracer:
-    """A tracer of rays through any model. Surfaces are Lambertian; lamps are sampled once per ray and reflection.
+    """A tracer of rays through any MuJoCo model. Surfaces are Lambertian. Each hit of a ray samples every lamp once.
 
     name, why: name of the tracer, and the reason for its choice, for reports
-    light: level of light, "direct" or "bounce"; ValueError for "all"
-    basis: identity matrix (component, band), because each component of the light is one band
+    light: how often light is reflected: "direct" (once) or "bounce" (up to twice); ValueError for "all"
+    basis: identity matrix (component, band), because the light is traced in components that are single bands
     """
 
     name = "mitsuba"
@@ -159,7 +159,7 @@ class ModelTracer:
         return RowBuffers(self._scene, n_envs)
 
     def around(self, scenes: Scenes, rows: Rows, tables: Tables, world: Array) -> Surroundings:
-        """Return all that rays can meet in the worlds with these indices, one index for each ray."""
+        """Return all that rays can meet, given the index of each ray's world."""
         sizes = self._scene.movers.n_rows, max(len(self._scene.lights), 1) * LIGHT_ROWS, self._scene.paint.n_rows
         movers, lights, paint = (world * n for n in sizes)
         return Surroundings(
@@ -231,7 +231,7 @@ class ModelTracer:
     def which(self, ray: Array, there: Surroundings) -> Array:
         """Return what a ray hits first: a moving geom's index in `Movers`, or len(Movers) plus a static shape's id.
 
-        The id is 0 without a hit. `there.still` must be the scene that `ModelScene.one_shape_per_geom` contains.
+        The id is 0 without a hit. `there.still` must be the first item of `ModelScene.one_shape_per_geom`, a scene.
         """
         movers, any_still = len(self._scene.movers), len(there.still.shapes()) > 0
         si = there.still.ray_intersect_preliminary(ray) if any_still else _nothing()
@@ -241,7 +241,7 @@ class ModelTracer:
         return dr.select(hit.which < movers, hit.which, movers + dr.select(si.is_valid(), shape, 0))
 
     def _irradiance(self, hit: _SurfaceHit, axis: Array, there: Surroundings) -> list[Array]:
-        """Return the irradiance of surfaces due to lamps, as spectra of 4 bands each."""
+        """Return the irradiance of hit surfaces due to lamps. Each Mitsuba spectrum in the list contains 4 bands."""
         start = lighting.clear_of(hit.point, hit.normal)
         total = [mi.Spectrum(0) for _ in self._bands]
         for k, light in enumerate(self._scene.lights.found):

@@ -37,7 +37,7 @@ MESH = "mesh"
 class Hit:
     """First hit of a ray. Without a hit, `t` is `farthest` (see `Movers.nearest`), and `which` is len(Movers).
 
-    t, which: distance of the hit from the ray's origin [m], and index of the mover that is hit in `Movers`
+    t, which: distance of the hit from the ray's origin [m], and index in `Movers` of the geom that is hit
     normal, uv: normal (a unit vector in the world's frame), and texture coordinates (only for meshes and planes)
     """
 
@@ -80,9 +80,9 @@ class Movers:
     """The "movers": each moving geom once for each material that it may have. They are sorted by kind, meshes last.
 
     looks, geoms: appearance and geom id of each mover
-    atlas, bsdf: Mitsuba's scene of the moving meshes; a BSDF that this scene needs, and that has no effect on light
+    atlas, bsdf: Mitsuba's scene of the moving meshes, and a BSDF for the shapes in it, which has no effect on light
     lifts: for geoms that coincide with others, by geom id: distance [m] by which the surface is moved outwards
-    ends: index of the first mover of each kind, followed by the number of movers; an array for the kernel
+    ends: array, read by the kernel, of the index of the first mover of each kind, followed by the number of movers
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Movers:
 
     @property
     def apart(self) -> bool:
-        """True if a separate kernel intersects rays with moving geoms. It does so on a GPU if any of them is a mesh."""
+        """True if a kernel of its own intersects the moving geoms: on a GPU, if any moving geom is a mesh."""
         return self.atlas.scene is not None and on_gpu()
 
     @property
@@ -128,7 +128,7 @@ class Movers:
         return 1 + ROWS * len(self)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return a sphere around all moving geoms, then each mover's frame and size, as float32 (world, 4 n_rows)."""
+        """Return a sphere around all moving geoms, then each mover's frame and size, (world, 4 · `n_rows`) float32."""
         rows = np.zeros((poses.n, self.n_rows, 4), np.float32)
         if len(self):
             places, (sizes, reach) = poses.geom_places(self.geoms), self._extents(poses)
@@ -148,7 +148,7 @@ class Movers:
         return rows.reshape(poses.n, -1)
 
     def _absent(self, poses: Poses) -> np.ndarray | None:
-        """Return where a geom lacks its mover's material, (world or 1, mover); None if no geom's material varies."""
+        """Return where a geom's material is not its mover's, (world or 1, mover); None if no geom's material varies."""
         if not self._drawn.any():
             return None
         here = self._as_built if poses.geom_matid is None else poses.geom_matid
@@ -156,7 +156,7 @@ class Movers:
         return absent
 
     def _extents(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-        """Return half sizes (world or 1, mover, 3) and bounding radii (world or 1, mover) of moving geoms [m]."""
+        """Return half sizes (world, mover, 3) and bounding radii (world, mover) [m]; one world if all are alike."""
         if poses.geom_size is None:
             sizes = self._sizes[None].copy()
         else:
@@ -195,7 +195,7 @@ class Movers:
         return Hit(*found)
 
     def block(self, ray: Array, farthest: Array, there: MoverRows) -> Array:
-        """Return whether any mover blocks a ray at a distance less than `farthest` [m]."""
+        """Return whether a ray hits at least one moving geom at a distance less than `farthest` [m]."""
         if self.apart:
             computed(ray, farthest, there.fours, there.first)
             blocked = self._block(ray, farthest, there)
@@ -236,7 +236,7 @@ class Movers:
         return self.atlas.hit(o, d, frame.size, frame.reach)
 
     def _surface(self, ray: Array, t: Array, which: Array, there: MoverRows) -> tuple[Array, Array]:
-        """Return the normals in the world and the texture coordinates of hits."""
+        """Return the normal, in the world's frame, and the texture coordinates at each hit."""
         k = dr.minimum(which, len(self) - 1)
         frame = _frame(there, k)
         o, d = frame.to_mover(ray.o - frame.origin), frame.to_mover(ray.d)
@@ -285,7 +285,7 @@ def _frame(there: MoverRows, k: Array) -> _Frame:
 
 
 def _may_hit(ray: Array, there: MoverRows, row: Array | int) -> Array:
-    """Return whether a ray hits the sphere that a row contains, around one moving geom or around all (row 0)."""
+    """Return whether a ray hits the sphere in this row, which encloses all moving geoms (row 0) or one of them."""
     x, y, z, radius = there.four(row)
     way, square = mi.Vector3f(x, y, z) - ray.o, radius * radius
     along = dr.dot(way, ray.d)
@@ -294,7 +294,7 @@ def _may_hit(ray: Array, there: MoverRows, row: Array | int) -> Array:
 
 
 def _loop(kind: int, there: MoverRows, step: Callable[..., Any], *state: Array) -> tuple[Array, ...]:
-    """Run a step for each mover of a kind; return the index after the last mover, and the last state."""
+    """Run a step for each moving geom of a kind; return the index of the last one plus 1, and the last state."""
     start, end = (dr.gather(mi.UInt32, there.ends, kind + i) for i in (0, 1))
     found: tuple[Array, ...] = dr.while_loop((start, *state), lambda k, *_: k < end, step, label="movers")
     return found

@@ -26,7 +26,7 @@ from sim.tracing.world_rows import WorldRows
 
 @dataclass(frozen=True)
 class PaintRows(WorldRows):
-    """Reflectances of geoms whose colour differs between worlds ("painted" geoms), in the world of a ray.
+    """Reflectances of "painted" geoms, whose colour differs between worlds. Each ray reads those of its own world.
 
     The reflectances are stored in rows of four floats.
 
@@ -40,7 +40,8 @@ class Paint:
     """Colours of the "painted" geoms, whose colours differ between worlds. The scene's Mitsuba variant must be active.
 
     geoms: ids of the painted geoms
-    movers: geom id of each "mover". Each moving or painted geom is one mover for each material that it may have
+    movers: geom id of each "mover". A mover is a moving or painted geom with one of the materials that it may have, so
+        a geom with two possible materials is two movers
     wavelengths: centres of the bands [m], (band,)
     glow: True if any of the painted geoms glows
     painted: for each mover, the index of its geom in `geoms`, or len(geoms) if this geom is not painted; an array for
@@ -68,7 +69,11 @@ class Paint:
         return max(len(self) * len(self._spectra) * (1 + self.glow), 1)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return the reflectances in each world, (world, 4 n_rows) float32, followed by emissions if a geom glows."""
+        """Return the reflectances and, if any painted geom glows, the emissions in each world.
+
+        The result is a float32 array (world, 4 n_rows). Each row of four floats (`n_rows` in each world) contains four
+        bands of one geom. The emissions of all geoms follow their reflectances.
+        """
         rows = np.zeros((poses.n, self.n_rows * lighting.LANES), np.float32)
         if not len(self):
             return rows

@@ -1,9 +1,9 @@
-"""Intersections of rays with MuJoCo's primitives, in the geom's own frame, from outside.
+"""Intersections of rays with MuJoCo's primitives, such as boxes and capsules, where a ray enters them from outside.
 
-Only the outer side of a geom's surface is visible, except for planes. As in MuJoCo's rendering, an eye inside a geom
-therefore sees through the geom's surface. Distances are multiples of the direction's length, and infinite for a miss.
-Roots are computed relative to the point at which the ray is nearest to the geom's centre or axis, so that hits of small
-or distant geoms are accurate in float32.
+Rays are given in the frame of the geom that is the primitive. Only the outer side of a geom's surface is visible,
+except for planes. As in MuJoCo's rendering, an eye inside a geom therefore sees through the geom's surface. Distances
+are multiples of the direction's length, and infinite for a miss. Roots are computed relative to the point at which the
+ray is nearest to the geom's centre or axis, so that hits of small or distant geoms are accurate in float32.
 
 Scenes that consist of upright walls and spheres are intersected by other modules (`sim.tracing.spheres`,
 `sim.tracing.wall_intersection`).

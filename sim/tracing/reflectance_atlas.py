@@ -1,7 +1,8 @@
 """Reflectances of all materials in one table, baked from Mitsuba's own BSDFs.
 
-Mitsuba evaluates every texel at the bands' wavelengths. Between texels the table is interpolated bilinearly and
-repeated, like Mitsuba's `bitmap`. A texture that is constant along an axis has a single texel along it.
+Mitsuba evaluates every texel at the bands' wavelengths. As in Mitsuba's `bitmap`, reflectances between texels are
+interpolated bilinearly, and a texture repeats beyond its edges. A texture that is constant along an axis has a single
+texel along it.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Intersections of rays with moving spheres, in closed form inside the renderer's kernel.
 
-Moving a shape of a Mitsuba scene rebuilds its acceleration structure. For a few spheres per world, closed forms are
-cheaper. Mitsuba and MuJoCo have the same texture coordinates on a sphere: u = azimuth / 2π, v = polar angle / π from
-+z, both in the sphere's own frame. The closed-form tracer uses this module. Here, a ray may start inside a sphere. The
-tracer for all other models uses `sim.tracing.primitives`, whose shapes are hit only from outside.
+When a shape of a Mitsuba scene moves, Mitsuba rebuilds the scene's acceleration structure. For a few spheres per world,
+closed forms are cheaper. Mitsuba and MuJoCo have the same texture coordinates on a sphere: u = azimuth / 2π, v = polar
+angle / π from +z, both in the sphere's own frame. The closed-form tracer uses this module. Here, a ray may start inside
+a sphere. The tracer for all other models uses `sim.tracing.primitives`, whose shapes are hit only from outside.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class SphereRows:
         self._checked: np.ndarray | None = None  # the last rotations without an error
 
     def fill(self, poses: Poses) -> None:
-        """Write the centres of the spheres in these worlds.
+        """Write the centres of the spheres in all worlds, for these poses, into the buffer.
 
         Raises:
             ValueError: the orientation of a sphere with a texture differs from the one in `Spheres.frames`.
@@ -122,10 +122,12 @@ def blocks(radii: list[float], centres: list[Array], ray: Array) -> Array:
 
 
 def surface_at(spheres: Spheres, centres: list[Array], which: Array, hit: Array) -> tuple[Array, Array, Array]:
-    """Return the point on the surface of sphere `which` at a hit point, the outward normal and the texture coordinates.
+    """Return the point of a sphere's surface that is nearest to a hit, the outward normal and the texture coordinates.
 
-    The point replaces the hit point, which rounding may place inside a distant sphere, where the sphere would shade
-    itself. Without a hit, the results have no meaning.
+    The point replaces the computed hit point, which rounding may place inside a distant sphere, where the sphere would
+    shade itself. Without a hit, the results have no meaning.
+
+    which, hit: index of the sphere that each ray hits, and the computed hit point
     """
     centre, radius = centres[0], mi.Float(float(spheres.radii[0]))
     for k, other in enumerate(centres[1:], 1):

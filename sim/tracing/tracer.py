@@ -39,8 +39,9 @@ class Tracer(Protocol):
 
     name: "closed_form" or "mitsuba"
     why: reason for its choice
-    light: level of light: "direct", "bounce" or "all"
-    basis: (component, band): radiance_b = sum_k basis[k, b] component_k
+    light: limit to the number of reflections of light: "direct" (one reflection), "bounce" (two) or "all" (no limit)
+    basis: contribution of each component to each spectral band, (component, band). The tracer computes light as a list
+        of components, which are bands or fixed spectra. The radiance in band b is sum_k basis[k, b] component_k
     """
 
     name: str
@@ -54,15 +55,15 @@ class Tracer(Protocol):
 
     @property
     def inputs(self) -> Any:
-        """Arrays that the kernel reads."""
+        """Arrays, the same for all worlds, that the kernel (the program that traces rays) reads."""
 
     def buffers(self, n_envs: int) -> Buffers:
         """Return buffers for all values that differ between `n_envs` worlds, such as places of moving geoms."""
 
     def around(self, scenes: Any, rows: Any, inputs: Any, world: Array) -> Any:
-        """Return the surfaces, lights and whatever else each ray can meet in its world.
+        """Return the surroundings of each ray: the surfaces that it can hit in its world, and the lights there.
 
-        scenes, inputs: `scene` and `inputs` of this tracer, passed as arguments of the kernel
+        scenes, inputs: `scene` and `inputs` of this tracer, which the kernel receives as arguments
         rows: the result of `Buffers.arrays`, which contains the values of all worlds
         world: index of each ray's world
         """
@@ -79,8 +80,9 @@ class Tracer(Protocol):
 class Tracers:
     """The tracers of a scene.
 
-    Some compute the light along single rays, others its average over areas, which are rectangles of the visual field.
-    Each tracer is for one level of light (`lighting.LEVELS`). The level limits how often light is reflected.
+    Some tracers compute the light along single rays. Others compute the average of the light over areas, which are
+    rectangles of the visual field. Each tracer is for one level of light (`lighting.LEVELS`). The level limits how
+    often light is reflected.
 
     scene, places: the scene, and the positions of the eyes in it
     name: "closed_form" (formulas for upright walls, a floor and spheres), "mitsuba" (any scene), or "auto": the closed
@@ -112,17 +114,17 @@ class Tracers:
 
     @property
     def is_upright(self) -> bool:
-        """True if direct light is traced in closed form."""
+        """True if direct light is traced in closed form, as is possible for upright walls, a floor and spheres."""
         return self.tracer_for(lighting.DIRECT).name == ClosedForm.name
 
     def tracer_for(self, light: str) -> Tracer:
-        """Return the tracer of rays for a level of light, which limits how often light is reflected.
+        """Return the tracer that computes light along rays, for a given limit to the number of reflections.
 
-        light: one of `lighting.LEVELS`
+        light: the limit, one of `lighting.LEVELS`: "direct" (one reflection) or "bounce" (two); "all" is not possible
 
         Raises:
-            ValueError: the level is "all", or the tracer is "closed_form" and the scene has no closed form for this
-                level.
+            ValueError: `light` is "all", or the tracer is "closed_form" and the scene has no closed form for this
+                limit.
         """
         if light not in self._known:
             with variant(self._scene.variant):

@@ -62,7 +62,7 @@ class UprightScene:
 
     @property
     def has_own(self) -> bool:
-        """True if the eyes' body is a sphere."""
+        """True if the body that carries the eyes is a sphere, which is then the last of `bodies`."""
         return len(self.bodies) > len(self.spheres)
 
 

@@ -1,4 +1,8 @@
-"""Intersections of rays with upright walls: one by one for few walls, by a walk through a grid for more."""
+"""Intersections of rays with upright walls.
+
+If there are at most 8 walls, each ray is tested against every wall. If there are more, each ray is followed from cell
+to cell through a grid in which walls fill whole cells.
+"""
 
 from __future__ import annotations
 
@@ -47,26 +51,31 @@ class Footprints(Protocol):
     tables: CellTables | None
 
     def hit(self, ray: Array, cells: CellTables | None) -> tuple[Array, Array, Array]:
-        """Return the distance [m] to the nearest wall, the index of the hit face, and its normal.
+        """Return the distance [m] to the first wall that a ray hits, the index of the hit face, and its normal.
 
-        The distance is infinite if there is no wall, and 0 inside a wall.
+        The distance is infinite without a hit, and 0 if the ray starts inside a wall.
 
-        cells: `tables`, passed as an argument of the kernel
+        cells: the attribute `tables` of this method, which the kernel (the program that traces rays) receives as an
+            argument
         """
 
     def blocks(self, start: Array, direction: np.ndarray, cells: CellTables | None) -> Array:
-        """Return whether a wall stands between a point outside all walls and a light in this upward direction.
+        """Return whether a wall stands between a point outside all walls and a light at infinity.
 
-        start, direction: the point (Point3f), and the unit vector towards the light, (3,)
-        cells: `tables`, passed as an argument of the kernel
+        start, direction: the point (Point3f), and the unit vector from it to the light, which points upwards, (3,)
+        cells: the attribute `tables` of this method, which the kernel (the program that traces rays) receives as an
+            argument
         """
 
 
 def footprints_of(walls: Walls) -> Footprints:
-    """Return the cheaper of the two intersection methods for these walls.
+    """Return the faster method to intersect rays with these walls: `EachWall` for up to 8 walls, `Cells` for more.
+
+    `EachWall` tests every wall. `Cells` follows each ray through a grid of square cells.
 
     Raises:
-        NoClosedForm: there are many walls, and they do not fit a grid.
+        NoClosedForm: there are more than 8 walls, and they overlap, or no grid of at most 10⁶ cells exists in which
+            each wall fills whole cells.
     """
     return EachWall(walls) if len(walls) <= FEW else Cells(walls)
 

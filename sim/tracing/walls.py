@@ -27,9 +27,9 @@ _KEPT = KeptValues(MOST_MODELS)
 
 
 class NoClosedForm(ValueError):
-    """A world cannot be rendered by formulas in closed form, which exist for upright walls, a floor and spheres.
+    """A world cannot be rendered by formulas in closed form. The message states the reason.
 
-    The message states the reason.
+    Such formulas exist only for worlds that consist of upright walls, a floor and spheres.
     """
 
 
@@ -41,7 +41,8 @@ class Walls(ReadOnlyArrays):
     top: height of each wall's top [m], (n,)
     floor: height of the floor [m]
     floor_lower, floor_upper: corners of the floor [m], (2,)
-    uv: texture coordinates of faces, (4 n + 1, 2, 4): (u, v) = uv @ (x, y, z, 1); the floor comes last
+    uv: for each face, the matrix that converts a point (x, y, z, 1) [m] to texture coordinates (u, v), (4 n + 1, 2, 4);
+        the floor comes last
     geoms: geom id of each face, (4 n + 1,)
     """
 
@@ -76,7 +77,10 @@ def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> W
 
 
 def _walls(model: mujoco.MjModel, geoms: Sequence[int], lowest: float, highest: float) -> Walls:
-    """Return the walls and the floor for eyes between two heights [m]; see `walls_of`."""
+    """Return the walls and the floor of a world, see `walls_of`.
+
+    lowest, highest: heights of the lowest and the highest pupil [m]
+    """
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     floors = [g for g in geoms if surfaces.geom_type(model, g) == mujoco.mjtGeom.mjGEOM_PLANE]

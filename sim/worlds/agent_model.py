@@ -22,7 +22,7 @@ class AgentModel:
 
     model: the agent, and 4 boxes (ROOM) that do not collide, which are placeholders for walls; there are no objects,
         walls, lights, cameras or textures
-    whole: hash of the complete model of the world, from which the agent was extracted
+    whole: hash of the world's complete model; the agent was extracted from this model
     """
 
     model: mujoco.MjModel
@@ -30,12 +30,13 @@ class AgentModel:
 
     @classmethod
     def from_spec(cls, spec: mujoco.MjSpec, whole: mujoco.MjModel) -> AgentModel:
-        """Extract the body "agent" from a spec.
+        """Return the model of an agent: a spec's body "agent" without the rest of the world.
 
         whole: the model that has been compiled from this spec
 
-        The result is kept, and calls with an equal `whole` return the same model, so do not change it. It is kept
-        because extraction is slow: removing hundreds of walls from a copy of the spec takes half a second.
+        The agent's model is cached, and calls return the same model if the hashes of their `whole` are equal, so do not
+        change it. It is cached because extraction is slow: removing hundreds of walls from a copy of the spec takes
+        half a second.
         """
         whole_hash = model_hash(whole)
         return cls(_KEPT.get(whole_hash, lambda: _alone(spec.copy())), whole_hash)

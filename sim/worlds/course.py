@@ -1,8 +1,9 @@
-"""Courses: paths between walls that lead back towards their start by at most 1.5 m.
+"""Courses: paths between walls, on which an agent never has to come back towards its start by more than 1.5 m.
 
 Navigation rewards an increase of the distance from the start. If the path leads back towards the start, this reward
-has a local optimum that no agent ever leaves (docs/concepts/physics.md). On the way through a course, the straight
-distance from the start never has to fall more than 1.5 m (MOST_FALL) below a value that it had before.
+has a local optimum that no agent ever leaves (docs/concepts/physics.md). In a course, an agent that approaches the goal
+can therefore always go on to the goal without coming more than 1.5 m (MOST_FALL) closer to the start than it is. These
+distances are measured in a straight line.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class Course:
     Raises:
         ValueError: the lines differ in length, contain another character or have a free cell in the border; there is no
             "S"; a start lies in the goal or has no suitable path to it; or an argument has a wrong type or range. On a
-            suitable path, the straight distance from the start never falls more than 1.5 m below an earlier value.
+            suitable path, an agent never has to come back towards its start by more than 1.5 m (in a straight line).
     """
 
     drawing: str
@@ -102,7 +103,7 @@ class Course:
 
     @cached_property
     def goal(self) -> np.ndarray:
-        """Cells of the goal, boolean (row, column)."""
+        """True for cells of the course that belong to the goal, boolean (row, column)."""
         goal = ~self.walls
         goal[:, : -1 - GOAL_COLUMNS] = False
         return read_only(goal)
@@ -133,12 +134,13 @@ class Course:
         return float(np.arctan2(ahead[0] - cell[0], ahead[1] - cell[1]))
 
     def fall(self, start: Cell) -> tuple[float, Cell]:
-        """Return how much the distance from a start must decrease on the way to the goal [m], and from which cell on.
+        """Return how far an agent must come back towards a start on the way to the goal [m], and after which cell.
 
         The method considers all cells that an agent can reach if each of its steps, from the start on, brings it closer
         to the goal along the shortest path (`way`). From each of these cells, the agent takes the path to the goal that
-        stays as far away from the start as possible. The decrease is the difference between two distances from the
-        start: that of the cell, and the smallest one on this path. The result is the largest decrease, and its cell.
+        stays as far away from the start as possible. The agent comes back by the distance between start and cell, minus
+        the smallest distance between the start and this path. The result is the largest of these differences, and the
+        cell for which it was computed.
         """
         ease = self._ease(start)
         return max((_apart(start, cell) - float(ease[cell]), cell) for cell in self._ahead(start))
@@ -149,10 +151,10 @@ class Course:
         return np.asarray(CELL * np.hypot(rows - start[0], columns - start[1]))
 
     def _ease(self, start: Cell) -> np.ndarray:
-        """Return how close to the start an agent must come on the way from each cell to the goal [m].
+        """Return how close to the start an agent must come on the way from each cell to the goal [m], (row, column).
 
-        On each path from a cell to the goal, one cell is nearest to the start. The result is the distance of this cell
-        from the start, for the path on which this distance is largest; -1 if there is no path. Array (row, column).
+        The agent takes the path that stays as far away from the start as possible. The result is the smallest distance
+        between this path and the start; -1 if there is no path to the goal.
         """
         ease, apart = np.full(self.walls.shape, -1.0), self._apart_from(start)
         queue = [(-float(apart[cell]), cell) for cell in _cells(self.goal)]
@@ -196,7 +198,7 @@ class Course:
 
     @cached_property
     def _neighbors(self) -> dict[Cell, tuple[Cell, ...]]:
-        """Results of `_next_to` that have been computed."""
+        """Cache of the method `_next_to`: for each cell, the free cells that an agent can enter next."""
         return {}
 
     def places(self, cells: list[Cell]) -> np.ndarray:

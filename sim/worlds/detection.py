@@ -26,9 +26,9 @@ def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
     which follow parallels.
 
     A goal's stripes are 12 sectors of 30° around the vertical axis, and a viewer sees 6 of them. The edges of an
-    adversary's stripes are placed such that light from above gives it the same brightness as a goal, on average over
-    directions. From 2 m or more, a single receptor that sees the whole object therefore cannot distinguish a goal from
-    an adversary by brightness.
+    adversary's stripes are placed such that in light from above, it has the same brightness as a goal, on average over
+    the horizontal directions of view. From 2 m or more, a single receptor that sees the whole object therefore
+    cannot distinguish a goal from an adversary by brightness.
     """
     materials.add_texture(spec, "upright_stripes", materials.stripes((8, 1536), 2 * STRIPES, axis=1))
     materials.add_texture(

@@ -1,10 +1,10 @@
-"""Foraging: an open walled field with a goal and two adversaries, which differ only in reflectance below 400 nm.
+"""Foraging: an open walled field. The goal differs from the two adversaries only in its reflectance below 400 nm.
 
-The field is the same as in the task "detection". All objects have the same vertical stripes, and are yellow,
-like many flowers. The goal also reflects ultraviolet, like many flowers that bees visit. The default RGB-like receptors
+The field is the same as in the task "detection". All objects have the same vertical stripes. They are yellow, as many
+flowers are. The goal also reflects ultraviolet, like many flowers that bees visit. The default RGB-like receptors
 absorb no light below 400 nm. To them, goal and adversary are identical under any light and for any number of spectral
-bands. (If the spectra also differed in the visible range, they could be metamers only for certain lights and numbers of
-bands.)
+bands. (If the reflectances also differed in the visible range, goal and adversary could look the same to these
+receptors only under certain lights, and for certain numbers of bands.)
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def petal(ultraviolet: float) -> Spectrum:
 
 
 def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
-    """Add the field and the objects, which all have vertical stripes; `rng` is not used."""
+    """Add the walled field, a goal and two adversaries. All three objects have vertical stripes; `rng` is not used."""
     spectra = {kind: petal(share) for kind, share in ULTRAVIOLET.items()}
     materials.add_texture(spec, "upright_stripes", materials.stripes((8, 512), 2 * STRIPES, axis=1))
     for kind, spectrum in spectra.items():

@@ -36,7 +36,10 @@ class GroundPlan:
 
     @classmethod
     def from_world(cls, world: World, place: np.ndarray) -> GroundPlan:
-        """Return the plan of a world; if the world has several layouts, only of the one around `place` (2,) [m]."""
+        """Return the plan of a world. If the world has several layouts, the plan shows one of them.
+
+        place: point (x, y) [m], (2,); the plan shows the layout that contains it
+        """
         model = world.model
         walls = np.array([_footprint(model, i) for i in range(model.ngeom) if model.geom(i).name.startswith("wall")])
         region = world.goal_region

@@ -135,7 +135,7 @@ class LayoutSet:
         """Walls of the mazes in this set, boolean (row, column) each.
 
         Raises:
-            ValueError: two mazes of `family`, in any of its sets, are equal.
+            ValueError: two mazes in the training, selection and test sets of the family are equal.
         """
         return _drawn(self.family, "maze")[self.name]
 
@@ -144,7 +144,8 @@ class LayoutSet:
         """The courses of this set.
 
         Raises:
-            ValueError: two courses of `family`, in any of its sets, are equal, or no course of this size was found.
+            ValueError: two courses in the training, selection and test sets of the family are equal, or no course with
+                the family's numbers of rows and columns was found.
         """
         return _drawn(self.family, "navigation")[self.name]
 
@@ -170,7 +171,8 @@ def _drawn(family: LayoutFamily, task: str) -> Mapping[str, tuple[Any, ...]]:
     """Return the mazes or courses of a family, by the name of the set ("training", "selection" or "test").
 
     Raises:
-        ValueError: two layouts have the same walls, or no course of this size was found.
+        ValueError: two layouts have the same walls, or no course with the family's numbers of rows and columns was
+            found.
     """
     draw = _DRAW[task]
     found: dict[str, tuple[Any, ...]] = {}

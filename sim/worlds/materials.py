@@ -1,8 +1,8 @@
 """Materials of the built-in worlds: functions that add reflectances, striped textures and daylight to an MjSpec.
 
 MuJoCo's colours are display-referred (sRGB). This module therefore encodes reflectances as sRGB, and `sim.mirror`,
-which copies a model to Mitsuba, decodes them (`sim.scene.color`). The MjModel also contains the textures, and is the
-only source of reflectances apart from measured spectra.
+which copies a model to Mitsuba, decodes them (`sim.scene.color`). The renderer takes reflectances only from the colours
+and textures of the MjModel, and from measured spectra.
 """
 
 from __future__ import annotations

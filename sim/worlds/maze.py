@@ -22,7 +22,7 @@ _NEIGHBORS = ((0, 2), (0, -2), (2, 0), (-2, 0))
 def add_layout(spec: mujoco.MjSpec, mazes: Sequence[np.ndarray], rngs: Sequence[np.random.Generator]) -> Layout:
     """Add mazes of equal size, which lie next to each other from south to north and are not connected.
 
-    An episode starts in any of the mazes, so that an agent learns a behaviour that works in all of them.
+    Each episode starts in one of the mazes, so that an agent learns a behaviour that works in all of them.
 
     mazes: walls of each maze, boolean (row, column)
     rngs: random number generators that draw the stripes on the walls: one for all mazes, or one for each maze

@@ -1,4 +1,7 @@
-"""Random courses: paths that bend, split and join again, and lead back towards their start by at most 1.5 m."""
+"""Random courses: paths that bend, split and join again.
+
+On the way to the goal, an agent never has to come back towards its start by more than 1.5 m.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +29,8 @@ def draw_course(shape: tuple[int, int], rng: np.random.Generator, width: int = 3
 
     Two centre lines lead from the same cell in the west to the goal in the east. Their straight parts have random
     directions and lengths. The free cells are those of the centre lines and, on wide paths, their four neighbours. On
-    narrow paths, each diagonal step also has a free cell at its corner. Episodes start at the west end, and in training
-    also along one of the centre lines.
+    narrow paths, if a line goes on to a diagonal neighbour, one of the two cells beside this step is also free, so that
+    the step cuts only one corner. Episodes start at the west end, and in training also along one of the centre lines.
 
     shape: number of cells (rows, columns)
     width: width of a path along x or y [cells]: 1 or 3
@@ -48,7 +51,7 @@ def draw_course(shape: tuple[int, int], rng: np.random.Generator, width: int = 3
 def _center_line(row: int, shape: tuple[int, int], rng: np.random.Generator) -> list[Cell]:
     """Return the cells of a centre line from the west end of a row to the column before the east border.
 
-    Along the line, the distance from any earlier cell never falls more than 1.5 m below a value that it had before.
+    A centre line is the middle of a path. The line hardly leads back towards its earlier cells (see `_hardly_falls`).
     """
     line, last = [(row, 1), (row, 2), (row, 3)], _EAST
     while line[-1][1] < shape[1] - 2:
@@ -65,8 +68,8 @@ def _center_line(row: int, shape: tuple[int, int], rng: np.random.Generator) -> 
 def _straight(cell: Cell, step: Cell, length: int, shape: tuple[int, int]) -> list[Cell]:
     """Return up to `length` cells that follow `cell` in the direction `step`.
 
-    Cells in which a centre line must not lie are left out: the two northernmost and the two southernmost rows, and the
-    easternmost column.
+    The cells are part of the centre line of a path. Cells in which it must not lie are left out: the two northernmost
+    and the two southernmost rows, and the easternmost column.
     """
     cells = [(cell[0] + k * step[0], cell[1] + k * step[1]) for k in range(1, length + 1)]
     return [(r, c) for r, c in cells if 2 <= r < shape[0] - 2 and c < shape[1] - 1]
@@ -75,7 +78,8 @@ def _straight(cell: Cell, step: Cell, length: int, shape: tuple[int, int]) -> li
 def _hardly_falls(line: list[Cell]) -> bool:
     """Return whether a line hardly leads back towards any of its earlier cells.
 
-    Along the line, the distance from any earlier cell must never fall more than 1.5 m below a value that it had before.
+    An agent that follows the line from any one of its cells must never come back towards this cell by more than 1.5 m:
+    its straight distance from the cell must stay within 1.5 m of the largest distance reached so far.
     """
     cells = np.array(line, float) * CELL
     apart = np.linalg.norm(cells[:, None] - cells[None], axis=-1)

@@ -1,4 +1,4 @@
-"""Walls of grid cells, built from boxes with stripes. Each box has a random stripe frequency."""
+"""Walls that fill cells of a grid, built from boxes with stripes. Each box has a random stripe frequency."""
 
 from __future__ import annotations
 

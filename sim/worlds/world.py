@@ -59,8 +59,8 @@ class World(ReadOnlyArrays):
     object_spawn: possible positions of objects, at the centres of cells [m], (n, 2)
     goal_region: goal region in navigation and mazes, (x_min, y_min, x_max, y_max) [m]; None in other tasks
     spectra: measured spectra of materials and lights, by name. Renderers use them instead of the model's colours
-    alone: small model of the agent only, for a faster simulation of agents near walls; None: agents near walls are
-        simulated in the whole model
+    alone: small model of the agent, to which only the few walls near the agent are added, for a faster simulation of
+        contacts; None: agents near walls are simulated in the whole model
     training_starts: starting positions of the agent in training; None: `starts`
     episode_steps: number of actions after which an episode is truncated; None: the task's default
     mazes: number of mazes or courses, which are arranged from south to north; 1 in other tasks
@@ -82,7 +82,7 @@ class World(ReadOnlyArrays):
 
     @property
     def agent_spawn(self) -> np.ndarray:
-        """All possible starting positions of the agent, in training or evaluation [m], (n, 2)."""
+        """All positions at which the agent may start in training, in evaluation or in both [m], (n, 2)."""
         if self.training_starts is None:
             return self.starts.position
         return np.unique(np.concatenate([self.starts.position, self.training_starts.position]), axis=0)
@@ -105,12 +105,12 @@ def build_world(
     task: one of `sim.TASKS`
     seed: seed of the mazes and of the stripes on walls in mazes and courses, 0 to 2¹²⁸; the worlds of other tasks do
         not depend on it
-    mazes: number of mazes in the task "maze", 1 to 100,000; an episode starts in any of them
+    mazes: number of mazes in the task "maze", 1 to 100,000; each episode starts in one of them
     course: course of navigation: "short", "long" (twice as long, with half as many actions) or a `sim.Course`
-    layouts: one set of a `sim.LayoutFamily` for navigation or mazes, instead of `seed`, `mazes` and `course`; an
-        episode starts in any of its layouts
+    layouts: one set of a `sim.LayoutFamily` for navigation or mazes, instead of `seed`, `mazes` and `course`; each
+        episode starts in one of its layouts
     wall_height: height of all walls [m], in [0.4, 100]. In the code published by Tiwary, Young et al. (*Science
-        Advances* 11(51), 2025), it is 0.5
+        Advances* 11(51), 2025), walls are 0.5 m high
     eyes: eyes for which the agent gets cameras, with the names of `Eyes.names()`; None: no cameras
     spectra: spectra of materials and lights, by name ("wall", "floor", "light_0" ...). They add to the spectra that the
         task defines, or replace them. Each is an `optics.Spectrum`, or a name that `optics.reflectance` or
@@ -121,10 +121,10 @@ def build_world(
 
     Raises:
         ValueError: an argument has the wrong type or is out of range; the task, the course, the medium or a spectrum is
-            unknown; or `spectra` names neither a material nor a light, or has a reflectance above 1. Other causes are
-            that `mazes`, `course` or `layouts` is given for a task that does not use it, that `layouts` is combined
-            with `seed`, `mazes` or `course`, that two layouts of the family are equal, or that no random course of the
-            family's size was found.
+            unknown; or `spectra` names neither a material nor a light, or has a reflectance above 1. `mazes`, `course`
+            or `layouts` is given for a task that does not use it; or `layouts` is combined with `seed`, `mazes` or
+            `course`. Two layouts of the `sim.LayoutFamily` that contains `layouts` are equal, or no random course with
+            its numbers of rows and columns was found.
     """
     if not isinstance(task, str) or task not in TASKS:
         raise ValueError(f"unknown task {shown(task)}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")
@@ -175,10 +175,10 @@ def _layout(spec: mujoco.MjSpec, task: str, rng: np.random.Generator, mazes: int
 
 
 def _check_layouts(task: str, layouts: Any, alone: bool) -> None:
-    """Check the type of `layouts`, and that the task has layouts.
+    """Check the type of `layouts`, that the task has layouts, and that `layouts` is not combined with other arguments.
 
-    alone: True if `seed`, `mazes` and `course` have their default values. It must be True, because `layouts` replaces
-        these arguments
+    alone: True if the arguments `seed`, `mazes` and `course` of `build_world`, which `layouts` replaces, have their
+        default values
 
     Raises:
         ValueError: a check fails, or `alone` is False.

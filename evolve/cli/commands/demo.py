@@ -1,4 +1,4 @@
-"""`evolve demo`: a finished run that is part of rhabdom."""
+"""`evolve demo`: a copy of the finished run that is included in rhabdom, with report, replay and EXR files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ __all__ = ["demo"]
 
 
 def demo(arguments: Namespace) -> int:
-    """Copy the shipped run into a directory, and write the report, replay and EXR files of its best animal."""
+    """Copy the finished run that is included in rhabdom into a directory, and write the files about it.
+
+    These files are the run's report, and the replay and EXR files of its best animal.
+    """
     device.make_ready()
     run = copy_shipped_run(arguments.out)
     shown = not (arguments.json or arguments.quiet)

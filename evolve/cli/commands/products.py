@@ -146,7 +146,7 @@ def _waiting(arguments: Namespace, text: str) -> Waiting:
 
 
 def _open(arguments: Namespace) -> Run:
-    """Open the run, and check that eyes can be computed on this machine.
+    """Open the run, and check that Dr.Jit, which computes PSFs and the signals of eyes, works on this machine.
 
     Raises:
         BackendError: Dr.Jit finds no usable LLVM library or GPU.

@@ -111,7 +111,11 @@ def _show(plan: RunPlan, as_json: bool) -> int:
 
 
 class _Shown:
-    """Watchers of a run: one shows progress in the selected form, and one writes TensorBoard's files if requested."""
+    """Watchers: objects that the search informs about the progress of a run.
+
+    One watcher shows the progress in the form that the arguments select. If the arguments request it, another one
+    writes files for TensorBoard.
+    """
 
     def __init__(self, arguments: Namespace) -> None:
         self._arguments = arguments
@@ -221,7 +225,10 @@ def _finished_event(run: Run, best: Candidate, made: Products) -> dict[str, Any]
 
 
 def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:
-    """Return lines about the best candidate, failed candidates, failed episodes and repaired genomes."""
+    """Return lines about the best candidate, failed candidates, failed episodes and repaired genomes.
+
+    A genome is repaired if eyes or receptors would overlap: genes are changed until they do not.
+    """
     fitness = fitness_text(best.fitness, best.costs)
     lines = [f"best: candidate {best.id}, fitness {fitness}, success rate {best.success_rate:.0%}"]
     if failures:

@@ -104,10 +104,10 @@ def _show(arguments: Namespace, now: dict[str, Any]) -> None:
 
 
 def standing(run: Run) -> dict[str, Any]:
-    """Return, by name, a run's state, its best candidate, and a summary of each generation as JSON values.
+    """Return, by name, a run's state, its best candidate, and a summary of each generation.
 
-    Only the value of "mishaps" is not JSON: it is a list of `EpisodeFailure` objects, whose fields are JSON values. The
-    value of "state" is "running" if a process holds the lock of the run, else "finished" or "interrupted".
+    All values are JSON values, except that of "mishaps": a list of `EpisodeFailure` objects, whose fields are JSON
+    values. The value of "state" is "running" if a process holds the lock of the run, else "finished" or "interrupted".
 
     Raises:
         OSError: the lock or config.toml cannot be read.
@@ -147,7 +147,11 @@ def _generations(run: Run) -> list[dict[str, Any]]:
 
 
 def _generation(members: Sequence[Candidate]) -> dict[str, Any]:
-    """Return the state of a generation as JSON values, with task fitness and costs of its best candidate."""
+    """Return, by name, numbers that describe a generation, as JSON values.
+
+    "best", "task_fitness" (mean return) and "costs" belong to the best candidate: the fitness "best" is the mean return
+    minus the costs. Without a successful candidate, all values except "evaluated" are None.
+    """
     done = [candidate for candidate in members if candidate.failure is None]
     best = max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
     return {

@@ -25,7 +25,8 @@ class _Proof:
     """A validation script.
 
     module: name of the script's module
-    old: old name, which begins with a code (B0 in "B0_planner"); "" if there is none
+    old: name of the script before it was renamed, which `evolve validate` still accepts; it begins with a code (B0 in
+        "B0_planner"). "" if there is none
     """
 
     module: str
@@ -99,7 +100,7 @@ def _found(name: str, proofs: Mapping[str, _Proof]) -> _Proof:
 
 
 def _run(proofs: list[_Proof]) -> int:
-    """Run the scripts one after another. Return 1 if one fails, else 0."""
+    """Run these validation scripts one after another. Return 1 if one fails, else 0."""
     from evolve.runs.progress import clock
 
     if len(proofs) > 1:

@@ -1,8 +1,9 @@
-"""A renderer by area sampling for worlds of upright walls, a floor and spheres: in closed form, without noise.
+"""A tracer that averages light over areas of the visual field, in worlds of upright walls, a floor and spheres.
 
-The parts of floor, walls, sky and spheres that are visible in an area are its patches. A surface's texture is averaged
-over its patch, and each light is multiplied by the fraction of the patch that it reaches. Spectra are sums of a few
-components. Components and colours are those of the ray tracer `sim.tracing.closed_form_tracer`.
+An area is a rectangle of the visual field. The parts of floor, walls, sky and spheres that are visible in an area are
+its patches. A surface's texture is averaged over its patch in closed form, so there is no noise. Each light is
+multiplied by the fraction of the patch that it reaches. Spectra are sums of a few components. These components and the
+surfaces' reflectances are taken from the ray tracer `sim.tracing.closed_form_tracer`.
 """
 
 from __future__ import annotations
@@ -123,11 +124,11 @@ class AreaTracer:
         return [own + veil for own, veil in zip(found, self._medium.veil, strict=False)] + found[len(self.basis) :]
 
     def first_faces(self, origin: Array, level: Array, inputs: AreaTables) -> Array:
-        """Return the index of the first face of a wall that a ray hits; level: its horizontal direction (Vector2f)."""
+        """Return the index of the first wall face that a ray hits; level: the ray's horizontal direction (Vector2f)."""
         return self._columns.first_faces(origin, level, inputs.cells)
 
     def border_faces(self, area: Area, inputs: AreaTables) -> tuple[Array, Array]:
-        """Return the indices of the walls' faces that are visible at an area's left and right border."""
+        """Return the indices of the wall faces visible at the left and right border of an area of the visual field."""
         left, right = (self.first_faces(area.origin, area.level(mi.Float(a)), inputs) for a in (-0.5, 0.5))
         return left, right
 
@@ -136,12 +137,12 @@ class AreaTracer:
         return self.rays.buffers(n_envs)
 
     def bodies(self, rows: Array, world: Array, stand: Array) -> list[Array]:
-        """Return the centres of all bodies in each `world`; stand: position of the body that carries the eyes."""
+        """Return all bodies' centres in the worlds with these indices; stand: position of the body with the eyes."""
         return self.rays.all_bodies(centres_in(rows, len(self.rays.world.spheres), world), stand)
 
     @property
     def places(self) -> int:
-        """Number of rows of a world's table of illuminated bodies; 0 if the level of light is `DIRECT`."""
+        """Number of rows for one world in the table of the light on bodies; 0 if only direct light is traced."""
         return self._illumination.bodies.nodes_per_body_set if self._reflected else 0
 
     def body_light(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
@@ -172,7 +173,7 @@ class AreaTracer:
         return _in_layers(depth, piece.inverse_distance_at(piece.middle), sent_on)
 
     def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers) -> list[Array]:
-        """Return the floor's light in a rectangle of the visual field, from horizontal bands of equal height."""
+        """Return the floor's light in a rectangle of the visual field, summed over horizontal bands of equal height."""
         share = pieces[0].floor_share + pieces[1].floor_share
         a = sum(piece.middle * piece.floor_share for piece in pieces) / dr.maximum(share, LEAST_DIP)
 
@@ -213,11 +214,10 @@ class AreaTracer:
     def _sphere(
         self, area: Area, k: int, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers
     ) -> list[Array]:
-        """Return the fractions of the area in which a sphere hides walls and floor, followed by the sphere's light.
+        """Return the fractions of the area in which a sphere hides left wall, right wall and floor, then its light.
 
-        There are three fractions: for the left wall, the right wall and the floor. The light has one array per
-        component of its spectrum, for each depth layer. It is multiplied by the fraction of the area that the sphere
-        fills. Parts of the sphere that nearer spheres hide are omitted.
+        The light, one array per depth layer and component of its spectrum, is multiplied by the fraction of the area
+        that the sphere fills. Parts of the sphere that nearer spheres hide are omitted.
         """
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.on_patch(self._illumination, k, view.whole().patch, now)
@@ -236,9 +236,9 @@ class AreaTracer:
         return [*hidden, *total]
 
     def _strip(self, area: Area, sphere: LitSphere, strip: Strip) -> list[Array]:
-        """Return the fraction of a sphere's strip that nearer spheres do not hide, and the light of this fraction.
+        """Return the fraction of a strip of a sphere that nearer spheres do not hide, and the visible part's light.
 
-        The light has one array per component, for each depth layer, times the fraction of the area that it fills.
+        The light, one array per depth layer and component, is multiplied by the visible part's share of the area.
         """
         k, view, now, depth = sphere.number, sphere.view, sphere.now, sphere.depth
         texture = self._sphere_textures[k]
@@ -263,7 +263,7 @@ class AreaTracer:
         return total
 
     def _not_hidden(self, area: Area, k: int, slice_: Slice, now: FrameState) -> Array:
-        """Return the visible fraction of a slice of sphere k; the parts that nearer spheres hide overlap at random."""
+        """Return the visible fraction of a slice of sphere k, if nearer spheres hide independent parts of the slice."""
         way = now.bodies[k] - area.origin
         bare = mi.Float(1)
         for j, other in enumerate(self._visible_bodies(now)):
@@ -278,7 +278,7 @@ class AreaTracer:
 
 
 def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) -> list[Array]:
-    """Return light from the distance 1 / inverse_distance along the eye's axis, divided among depth layers."""
+    """Return light divided among depth layers; 1 / inverse_distance: the source's distance along the eye's axis."""
     if depth.count == 1:
         return light
     return [share * component for share in depth.shares(inverse_distance) for component in light]

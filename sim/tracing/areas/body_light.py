@@ -1,7 +1,7 @@
 """Light on the visible part of a body.
 
-Shadows and the effect of other bodies are computed once for the whole part. All other factors depend on the surface's
-normal.
+Shadows and the effect of other bodies are computed once for the whole visible part. All other factors depend on the
+surface's normal.
 """
 
 from __future__ import annotations
@@ -36,7 +36,11 @@ class BodyLight:
 
     @classmethod
     def on_patch(cls, illumination: Illumination, body: int, patch: Patch, now: FrameState) -> BodyLight:
-        """Return the light on the visible part of the body with the index `body`; `patch` represents this part."""
+        """Return the light on the visible part of a body.
+
+        body: index of the body
+        patch: parallelogram in place of the visible part, for shadows and the effect of other bodies
+        """
         lit = illumination.visibility(patch, now, body)
         if not now.body_light:
             return cls(illumination, lit, [], [])

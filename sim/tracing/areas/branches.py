@@ -1,4 +1,4 @@
-"""Computations that the rendering program skips for areas of the visual field that do not need the results.
+"""Conditional computations, which are skipped for areas of the visual field that do not need the results.
 
 For example, only an area in which a sphere may be visible needs the light from this sphere.
 """

@@ -38,12 +38,15 @@ class CellGrid:
 
     @property
     def numbers(self) -> np.ndarray:
-        """Index of each free cell among the free cells, row by row; 0 also for cells with a wall; (row, column)."""
+        """Index of each free cell, a cell without a wall, among the free cells, (row, column).
+
+        Free cells are counted from 0, row by row. Cells with a wall have the value 0, like the first free cell.
+        """
         return np.where(self.free, np.cumsum(self.free).reshape(self.free.shape) - 1, 0)
 
     @property
     def corners(self) -> np.ndarray:
-        """Corner with the smallest x and y of each free cell [m], (cell, 2)."""
+        """Corner with the smallest x and y [m] of each cell without a wall, (cell, 2)."""
         row, column = np.nonzero(self.free)
         found: np.ndarray = self.corner + self.side * np.stack([column, row], axis=-1)
         return found

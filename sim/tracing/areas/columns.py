@@ -47,13 +47,14 @@ class Face:
 
 @dataclass(frozen=True)
 class Piece:
-    """The part of a wall's face that is visible between two vertical lines in an area ("columns").
+    """The part of a wall's face that is visible between two columns of an area.
 
-    An area is a rectangle of the visual field. The position a of a column runs from -1/2 at the area's left border to
-    1/2 at its right border.
+    An area is a rectangle of the visual field, and a column is a vertical line in it. The column's position runs from
+    -1/2 at the area's left border to 1/2 at its right border.
 
-    start, end: positions a of the first and the last column
-    inverse_distance: inverse distance 1/t of the face in the column a = 0, and its change per unit of a [1/m]
+    start, end: positions of the first and the last column
+    inverse_distance: 1/t in the area's middle column, and its change per unit of the position [1/m], where t is the
+        face's distance along the eye's axis
     floor_share, wall_share, sky_share: floor, wall and sky between the two columns, as fractions of the whole area
     """
 
@@ -67,23 +68,26 @@ class Piece:
 
     @property
     def middle(self) -> Array:
-        """Middle between the columns `start` and `end`, as a position in the area from -1/2 (left) to 1/2 (right)."""
+        """Horizontal position midway between `start` and `end` in an area, a rectangle of the visual field.
+
+        Positions run from -1/2 at the area's left border to 1/2 at its right border.
+        """
         return (self.start + self.end) / 2
 
     def inverse_distance_at(self, a: Array) -> Array:
-        """Return the inverse distance 1/t [1/m] of the wall's face in one column, a vertical line in the area.
+        """Return the inverse distance 1/t [1/m] of this piece of a wall at one horizontal position in an area.
 
         An area is a rectangle of the visual field. The distance t is measured along the eye's axis. If p is the x and y
-        of the pupil, the x and y of the face in this column are p + t · `Area.level(a)`.
+        of the pupil, the x and y of the wall at this position are p + t · `Area.level(a)`.
 
-        a: position of the column, from -1/2 (left border of the area) to 1/2 (right border)
+        a: horizontal position, from -1/2 (left border of the area) to 1/2 (right border)
         """
         return dr.maximum(dr.fma(self.inverse_distance[1], a, self.inverse_distance[0]), LEAST_NEARNESS)
 
     def place(self, area: Area, a: Array) -> Array:
-        """Return the point in plan (Point2f) where one column, a vertical line in the area, meets the wall's face.
+        """Return the x and y (Point2f) of the wall's face at one horizontal position in an area of the visual field.
 
-        a: position of the column, from -1/2 (left border of the area) to 1/2 (right border)
+        a: horizontal position, from -1/2 (left border of the area) to 1/2 (right border)
         """
         return area.origin.xy + area.level(a) / self.inverse_distance_at(a)
 
@@ -111,13 +115,14 @@ class Piece:
 
 
 class Columns:
-    """Search for the parts of walls that are visible in areas, rectangles of the visual field.
+    """Search for the parts of walls that are visible in given rectangles of the visual field.
 
     All walls of the world have the same height.
 
     top: height of the walls' tops [m]
 
-    Attribute `face_ends`: x and y of the left and right ends of all faces, which is passed to the rendering program.
+    Attribute `face_ends`: table of the x and y of the left and right end of each face, an input of the rendering
+        program.
     """
 
     def __init__(self, walls: Walls, footprints: Footprints) -> None:
@@ -168,9 +173,10 @@ class Columns:
         return dr.select(t[0] < t[1], x, y + 2)
 
     def _edge(self, area: Area, left: Face, right: Face) -> Array:
-        """Return the column of the edge between two walls: an end of the nearer wall, or their common corner.
+        """Return the horizontal position in an area, from -1/2 to 1/2, of the edge between two visible walls.
 
-        If there is a gap between the walls, the surface in the gap is unknown, and the edge is put in the gap's middle.
+        The edge is the corner that the walls have in common, or else the end of the wall that is nearer to the eye. If
+        there is a gap between the walls, the surface in the gap is unknown, and the edge is put in the gap's middle.
         """
         ends = dr.minimum(_column_of(area, left.right, 1.0), 0.5)
         begins = dr.maximum(_column_of(area, right.left, -1.0), -0.5)
@@ -189,9 +195,10 @@ class Columns:
         return self.behind(area, piece, Rectangle(mi.Float(0), mi.Float(0), mi.Float(1), mi.Float(1)))
 
     def behind(self, area: Area, piece: Piece, part: Rectangle) -> Piece:
-        """Return the part of a piece of a wall's face that is visible in a smaller rectangle within the area.
+        """Return a piece of a wall's face, cut to what is visible in a smaller rectangle within the area.
 
-        The shares of floor, wall and sky are also those in the smaller rectangle, as fractions of the whole area.
+        The shares of the result count only floor, wall and sky in the smaller rectangle. They are fractions of the
+        whole area.
 
         part: the smaller rectangle, in units of the area's sides
         """
@@ -218,7 +225,7 @@ def _inverse_distance(area: Area, face: Face) -> tuple[Array, Array]:
 
 
 def _column_of(area: Area, point: Array, beyond: float) -> Array:
-    """Return the horizontal position a at which a point is visible in an area, a rectangle of the visual field.
+    """Return the horizontal position at which a point is visible in an area, a rectangle of the visual field.
 
     The position runs from -1/2 at the area's left border to 1/2 at its right border.
 
@@ -237,7 +244,7 @@ def _cross(a: Array, b: Array) -> Array:
 def _face_ends(walls: Walls) -> np.ndarray:
     """Return the x and y of the left end, and of the right end, of each face, (face, 4).
 
-    Left and right are those of a viewer in front of the wall. After the walls' faces follow the four sides of the
+    Left and right are those of a viewer in front of the wall. The last four rows contain the four sides of the
     rectangular floor, with left and right as for a viewer on the floor.
     """
     found = []

@@ -21,10 +21,10 @@ LEAST_DIP = 1e-4  # smallest downward slope of directions that hit the floor
 
 
 def distances_to_wall(area: Area, piece: Piece, patch: Patch) -> list[Array]:
-    """Return the distances [m] from the pupil to the two quadrature nodes on a wall, which lie side by side.
+    """Return the distances [m] from the pupil to two quadrature nodes that lie side by side on a wall.
 
     piece: part of the wall's face that is visible in the area
-    patch: this part, described as a parallelogram; both nodes are at the height of its middle
+    patch: parallelogram that approximates this part; both nodes are at the height of the parallelogram's middle
     """
     found, height = [], patch.point.z - area.origin.z
     for node in NODES:

@@ -1,6 +1,7 @@
 """Light on the moving bodies: the fraction of each light that reaches them, and the reflected light around them.
 
-The light does not depend on the eye, so it is computed once per world, in a table that all areas of the world read.
+The light does not depend on the eye. It is therefore computed once per world and stored in a table, which serves all
+areas of the eyes' visual fields.
 """
 
 from __future__ import annotations
@@ -30,10 +31,11 @@ Reflected = Callable[[Array, Array, Array], list[Array]]
 class IlluminatedBodies:
     """Computation and lookup of a table of the light on the moving bodies of all worlds.
 
-    Each row of the table describes one place on a body. For each light, it contains the fraction that reaches the
-    place. These numbers are stored in groups of four ("fours"). The first four rows of a body also contain sixteen
-    spherical harmonics of the reflected light around the body. Each of these rows contains four of the harmonics, for
-    each component of the light's spectrum.
+    Each row of the table describes one of ten places on a body. For each light, the row contains the fraction of the
+    light that reaches this place. A row stores these fractions in groups of four ("fours").
+
+    The table also contains sixteen spherical harmonics of the reflected light around each body, for each component of
+    the light's spectrum. Each of the first four rows of a body stores four of these harmonics.
 
     shadows: shadows of walls
     directions: directions towards the lights
@@ -56,8 +58,8 @@ class IlluminatedBodies:
         """Return rows of the table of light on bodies. A row contains the light at one place on a body.
 
         A row starts with one number per light: the fraction of this light that reaches the place. The numbers are
-        stored in groups of four. Then follow, for each component of the light's spectrum, four spherical harmonics of
-        the reflected light around the body.
+        stored in groups of four. After them, the row contains four spherical harmonics of the reflected light around
+        the body, for each component of the light's spectrum.
 
         A body has nine places on its sides, in a grid of three by three, and a tenth place that stands for the whole
         body. Walls block the light at all ten places. Other bodies block it only at the nine places on the sides.
@@ -65,8 +67,8 @@ class IlluminatedBodies:
         place: index of the row among the rows of one world: 10 · (index of the body) + (index of the place on it)
         bodies: centres of the world's bodies
         walls_around: for each cell of the walls' grid, which of its neighbours are walls (`WallShadows.around`)
-        reflected: function that returns harmonics for a body's index, the index of a group of four, and the body's
-            centre
+        reflected: function that returns one group of four harmonics; its arguments are the index of the body, the index
+            of the group, and the body's centre
         """
         k, side = place // PLACES, place % PLACES
         radius, whole = select(k, self._radii), side == WHOLE
@@ -98,9 +100,9 @@ class IlluminatedBodies:
         return self._row((world * len(self._radii) + k) * PLACES + WHOLE, table)
 
     def on_side(self, k: Array, towards: Array, world: Array, table: list[Array]) -> list[Array]:
-        """Return the fraction of each light that reaches the side of the k-th body in the direction `towards`.
+        """Return the fraction of each light that reaches one side of the k-th body of a world.
 
-        towards: unit vector from the body's centre
+        towards: unit vector from the body's centre to the middle of this side
         """
         # In whole numbers, because with many worlds, float32 is not accurate enough.
         first = (world * len(self._radii) + k) * PLACES

@@ -30,13 +30,13 @@ ITSELF_NONE = 2**16  # index for a patch that does not lie on a body
 
 @dataclass(frozen=True)
 class AreaTables:
-    """Arrays of area sampling that are the same in all worlds.
+    """Tables, shared by all worlds, from which the light in areas of the visual field is computed.
 
-    faces: walls' faces, eight numbers each, see `area_tracer`
-    face_ends: ends of all faces in the ground plan
+    faces: eight numbers for each wall face, which locate its texture, see `area_tracer`
+    face_ends: x and y of the left and right end of each face
     cells: the grid of cells in which walls stand; None: there is no grid, and the few walls are tested one by one
     around: for each cell of the grid, a number that states which of its neighbours are walls; None without walls
-    stripes: textures
+    stripes: tables of the surfaces' textures
     reflected: light that walls and floor reflect to each other; None: reflected light is neglected
     """
 
@@ -50,11 +50,11 @@ class AreaTables:
 
 @dataclass(frozen=True)
 class FrameState:
-    """Inputs of area sampling for one frame.
+    """Inputs for one frame, from which the light in areas, rectangles of the visual field, is computed.
 
-    bodies: centres of the moving spheres; the body that carries the eyes is the last one, if it is a sphere
+    bodies: centres of the moving spheres. If the body that carries the eyes is a sphere, its centre is the last one
     inputs: tables that are the same in all worlds
-    world: index of the world of each area
+    world: index of the world to which each area belongs
     body_light: tables of `IlluminatedBodies`, world by world; empty if light that bodies reflect is neglected
     """
 
@@ -65,12 +65,12 @@ class FrameState:
 
 
 class Illumination:
-    """Direct and reflected light on patches, without the light that walls and bodies block.
+    """Direct and reflected light on patches of surfaces, without the light that walls and bodies block.
 
     rays: tracer of rays through the world
     radii: radii of the bodies [m], (body,)
 
-    Attribute `around`: for each cell of the grid in which walls stand, which of its neighbours are walls.
+    Attribute `around`: for each cell of the walls' grid, a number that states which neighbours of the cell are walls.
     Attribute `bodies`: computation and lookup of the light on bodies.
 
     Raises:
@@ -123,11 +123,11 @@ class Illumination:
     def past_bodies(
         self, patch: Patch, arriving: list[Array], now: FrameState, itself: int = ITSELF_NONE
     ) -> list[Array]:
-        """Return the reflected light on a patch, per component, corrected for bodies.
+        """Return the reflected light on a patch, without light that bodies hide, and with light that they reflect.
 
-        Light that bodies hide is subtracted, and light that they reflect is added.
+        There is one array for each component of the light's spectrum.
 
-        arriving: reflected light on the patch without bodies, per component
+        arriving: reflected light on the patch as if there were no bodies, for each component
         itself: index of the body on which the patch lies
         """
 
@@ -197,12 +197,13 @@ class Illumination:
         """Return a body's radiosity as seen from a patch of a surface, for each component of the light's spectrum.
 
         The radiosity is the body's mean reflectance times the light on its visible side. This light is a weighted mean
-        of two limits. From far away, the patch sees the whole side, whose light follows Lambert's phase function. From
-        close by, the patch sees only the body's nearest point, with the irradiance there.
+        of its values for a distant patch and for a close one. A distant patch sees one half of the body, and the mean
+        light on this half follows Lambert's phase function. A close patch sees only the body's nearest point, with the
+        irradiance there.
 
         towards: unit vector from the body to the patch
         nearness: the body's radius divided by its distance. A fitted function of the nearness gives the weight of the
-            near limit. The weighted mean deviates from the true light by at most 0.05 of the light.
+            value for a close patch. The weighted mean deviates from the true light by at most 0.05 of the light.
         """
         near = nearness * (1.4 - 0.4 * nearness)
         lit = self.bodies.on_side(k, towards, now.world, now.body_light)
@@ -217,7 +218,9 @@ class Illumination:
 
 
 def _mean_colour(rays: ClosedForm, place: np.ndarray) -> np.ndarray:
-    """Return the mean reflectance of a texture that has one row, for each component of reflected light, (component,).
+    """Return a texture's mean reflectance for each component of reflected light, (component,).
+
+    The texture has one row of texels.
 
     place: place of the texture in the atlas, see `Atlas.places`
     """

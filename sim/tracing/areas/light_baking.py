@@ -1,4 +1,4 @@
-"""Computation of the tables of reflected light by brute force, with many rays from every node.
+"""Computation of the tables of reflected light by brute force: many rays are traced from each of many points.
 
 The tables describe the static scene. They take moving bodies into account in one way only: a body's shadows on floor
 and walls reduce the light that floor and walls reflect back to the body.
@@ -34,7 +34,7 @@ class Baking:
 
     tracer: tracer of rays through the world
     nodes: points of floor and walls at which the light is computed
-    kinds: radius and height of the centre [m] of each kind of body
+    kinds: for each kind of body, its radius and the height of its centre [m]
     """
 
     def __init__(self, tracer: ClosedForm, nodes: LightNodes, kinds: list[tuple[float, float]]) -> None:
@@ -62,12 +62,14 @@ class Baking:
         return {f"bounced_{name}_{k}": size for name, size in (sizes | bodies).items() for k in count}
 
     def tables(self) -> dict[str, np.ndarray]:
-        """Return tables of the reflected light on floor, walls and each kind of body, by name, float32, flat.
+        """Return tables of the reflected light on floor, walls and each kind of body, as flat float32 arrays by name.
 
         Each component of the light's spectrum has its own tables.
 
-        If the number of reflections is not limited (`lighting.ALL`), each iteration adds one reflection. The iterations
-        end when the tables change by at most 0.1 % of their largest value, at the latest after 16 reflections.
+        If the number of reflections is limited, walls and floor reflect light to each other once. If it is not limited
+        (`lighting.ALL`), the tables of floor and walls are computed repeatedly, and each repetition adds one
+        reflection. The repetitions end when the tables change by at most 0.1 % of their largest value, at the latest
+        after 16 reflections.
         """
         found = self._surfaces()
         for _ in range(self._orders - 1):
@@ -81,7 +83,10 @@ class Baking:
         return {name: np.ascontiguousarray(table) for name, table in found.items()}
 
     def _between(self, found: dict[str, np.ndarray]) -> Irradiance:
-        """Return a function that interpolates these tables to the irradiance at any point."""
+        """Return a function that interpolates the irradiance at any point of floor and walls.
+
+        found: tables of the irradiance at some points of floor and walls, by name
+        """
         light, count = NodeLight(self._nodes, len(self._tracer.basis)), range(len(self._tracer.basis))
         floor, walls = ([floats(found[f"bounced_{name}_{k}"]) for k in count] for name in ("floor", "walls"))
         tables = NodeTables(floats(self._nodes.cells), floor, walls)
@@ -184,9 +189,9 @@ class Baking:
 
 
 def _within(length: float, nodes: int) -> np.ndarray:
-    """Return evenly spaced positions along a length [m], (nodes,).
+    """Return positions along a length [m], evenly spaced from end to end, (nodes,).
 
-    The first and last would lie at the ends, but are moved inwards by 0.02 m.
+    Only the first and the last position are shifted: they lie 0.02 m inwards from the ends.
     """
     return np.clip(np.linspace(0, length, nodes), MARGIN, length - MARGIN)
 

@@ -48,10 +48,10 @@ class LightNodes:
 
     @classmethod
     def from_walls(cls, walls: Walls) -> LightNodes:
-        """Return the nodes of a world whose walls all have the same height.
+        """Return the nodes, at which reflected light is tabulated, of a world whose walls all have the same height.
 
         Raises:
-            NoClosedForm: there are no walls, they lie on no grid or overlap, or there are too many nodes.
+            NoClosedForm: there are no walls, the walls overlap or do not lie on a grid, or there are too many nodes.
         """
         if not len(walls):
             raise NoClosedForm("no walls, between which light would be reflected")
@@ -63,11 +63,11 @@ class LightNodes:
         return cls(grid, floor, top, across, up, _count(grid.side, BODY_SPACING))
 
     def body_margin(self, radius: float) -> float:
-        """Return the smallest distance [m] from a cell's border at which the light on a body is computed in advance.
+        """Return the smallest distance [m] of a body's centre from a cell's border in the tables of light on bodies.
 
-        The cells are the squares of the walls' grid. The distance is that of the body's centre. It is the body's
-        radius, because walls may stand at the borders, and a body's centre cannot be closer to a wall. For large
-        bodies, the distance is a quarter of the cell's side instead.
+        The tables contain the light for several positions of the body in each cell of the walls' grid. The smallest
+        distance is the body's radius, because walls may stand at the borders, and a body's centre cannot be closer to a
+        wall. For large bodies, the smallest distance is a quarter of the cell's side instead.
 
         radius: radius of the body [m]
         """
@@ -75,9 +75,9 @@ class LightNodes:
 
     @property
     def cells(self) -> np.ndarray:
-        """Numbers, from 0, of the cells of the walls' grid that contain no wall, and 0 for cells with a wall.
+        """Index of each cell of the walls' grid among the cells without a wall; cells with a wall have the value 0.
 
-        The numbers are a flat float32 array for the kernel, row by row (`CellGrid.numbers`).
+        The indices start at 0. They are a flat float32 array for the kernel, row by row (`CellGrid.numbers`).
         """
         return self.grid.numbers.astype(np.float32).ravel()
 
@@ -86,9 +86,9 @@ class LightNodes:
 class NodeTables:
     """Tables of the reflected light at the nodes, the points of floor and walls for which it was computed in advance.
 
-    cells: numbers, from 0, of the cells of the walls' grid that contain no wall, see `CellGrid.numbers`
-    floor, walls: irradiance at the nodes of the floor and of the walls, one array for each component of the light, a
-        spectral band or a fixed spectrum
+    cells: index of each cell of the walls' grid among the cells without a wall, see `CellGrid.numbers`
+    floor, walls: irradiance at the nodes of the floor and of the walls, one array for each component of the light (a
+        spectral band or a fixed spectrum)
     """
 
     cells: Array
@@ -130,7 +130,7 @@ class NodeLight:
         return self._interpolate(tables.walls, first, (across, self._nodes.across), (z, self._nodes.up))
 
     def on_surface(self, point: Array, normal: Array, tables: NodeTables) -> list[Array]:
-        """Return the irradiance at a point of the floor or of a wall due to reflected light.
+        """Return the irradiance that reflected light causes at a point of the floor or of a wall.
 
         There is one array for each component of the light, a spectral band or a fixed spectrum.
         """
@@ -146,9 +146,9 @@ class NodeLight:
 
 
 def corners(first: Array, *axes: tuple[Array, int]) -> Iterator[tuple[Array, Array]]:
-    """Yield index and weight, for bilinear interpolation, of the four nodes around a position on a rectangle.
+    """Yield the index of each of the four nodes around a position, and its weight in bilinear interpolation.
 
-    The rectangle, such as the floor or one wall of a cell, has a regular grid of nodes.
+    The nodes form a regular grid on a rectangle, such as one wall.
 
     first: index of the rectangle's first node
     axes: the position's x and y on the rectangle, in [0, 1], each with the number of nodes along this axis

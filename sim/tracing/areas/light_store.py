@@ -43,9 +43,10 @@ def write_error() -> str | None:
 
 
 def stored(baking: Baking) -> dict[str, np.ndarray]:
-    """Return the tables, from the cache if possible. Tables that are not in the cache are computed and stored there.
+    """Return a world's tables of reflected light, from the cache if possible.
 
-    If nothing can be written to the cache, they are computed at every call.
+    Tables that are not in the cache are computed and stored there. If nothing can be written to the cache, the tables
+    are computed at every call.
     """
     world = _digest(baking.ingredients)
     path = cache_folder() / f"{world}.npz"
@@ -75,7 +76,11 @@ def _checksum(tables: dict[str, np.ndarray], world: str) -> np.ndarray:
 
 
 def _read(path: Path, layout: dict[str, int], world: str) -> dict[str, np.ndarray] | None:
-    """Return the tables of a file, or None if it is missing, damaged or not of this layout and world."""
+    """Return the tables in a file, or None if the file is missing, damaged, or of another layout or world.
+
+    layout: expected number of values in each table, by the table's name
+    world: digest of the walls, surfaces, lights and settings from which the tables are computed
+    """
     sizes: dict[str, tuple[np.dtype, int]] = {name: (np.dtype(np.float32), size) for name, size in layout.items()}
     sizes[CHECKSUM] = (np.dtype(np.uint8), hashlib.sha256().digest_size)
     most = sum(dtype.itemsize * size + ENTRY for dtype, size in sizes.values())

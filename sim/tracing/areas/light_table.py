@@ -37,8 +37,8 @@ class LightTables(NodeTables):
 class LightTable(NodeLight):
     """Lookup of reflected light on floor, walls and bodies of one world.
 
-    tracer: tracer of rays through the same world. Each of its components of light, spectral bands or fixed spectra,
-        has its own tables
+    tracer: tracer of rays through the same world. It divides light into components (spectral bands or fixed spectra),
+        and there are separate tables for each component
     radii, heights: radii of the bodies, and heights of their centres [m]
     tables: the tables as Dr.Jit arrays, which are passed to the kernel (an attribute)
 
@@ -59,8 +59,9 @@ class LightTable(NodeLight):
     def on_body(self, body: Array, four: Array, centre: Array, tables: LightTables) -> list[Array]:
         """Return four coefficients (Vector4f) of the spherical harmonics of the light that arrives on a body.
 
-        There is one Vector4f for each component of the light, a spectral band or a fixed spectrum. From all groups of
-        four coefficients, `sum_of` computes the light that arrives at a point of the body's surface.
+        There is one Vector4f for each component of the light (a spectral band or a fixed spectrum). The harmonics have
+        sixteen coefficients, in four groups of four. `sum_of` computes the light that arrives at a point of the body's
+        surface from all four groups.
 
         body: index of the body
         four: index of the group of four coefficients

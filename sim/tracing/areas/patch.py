@@ -13,12 +13,12 @@ from optics.numerics.autodiff import Array
 class Area:
     """A rectangle on the tangent plane of an upright eye.
 
-    It contains the directions whose horizontal part is ahead + a · right and whose vertical part is up + b · height,
-    for |a| and |b| up to 1/2.
+    A point of the rectangle has a horizontal position a and a vertical position b, which run from -1/2 to 1/2. The
+    direction to the point has the horizontal part ahead + a · right and the vertical part up + b · height.
 
     origin: the pupil (Point3f)
-    ahead, up: direction to the rectangle's middle: its horizontal part (Vector2f), and its vertical part
-    right, height: the rectangle's full width as a horizontal vector (Vector2f), and its full height
+    ahead, up: horizontal part (Vector2f) and vertical part of the direction to the rectangle's middle
+    right, height: horizontal vector from the rectangle's left to its right border (Vector2f), and full height
     """
 
     origin: Array
@@ -29,20 +29,20 @@ class Area:
 
     @classmethod
     def from_extent(cls, middle: Array, axis: Array, extent: tuple[Array, Array]) -> Area:
-        """Return a rectangle around a ray, on the tangent plane of an eye with a horizontal axis.
+        """Return a rectangle around a ray, on the tangent plane of an eye whose axis is horizontal.
 
         The rectangle's width is horizontal, and its height is vertical.
 
         middle: ray to the middle of the rectangle; its direction has the component 1 along the eye's axis
         axis: horizontal axis of the eye, a unit vector (Vector2f)
-        extent: width and height on the plane tangent at the distance 1
+        extent: width and height on the eye's tangent plane, which is at the distance 1
         """
         width, height = extent
         right = mi.Vector2f(axis.y, -axis.x) * width
         return cls(middle.o, middle.d.xy, right, middle.d.z, mi.Float(height))
 
     def level(self, a: Array) -> Array:
-        """Return the horizontal part (Vector2f) of the directions at the horizontal position a, from -1/2 to 1/2."""
+        """Return the horizontal part (Vector2f) of directions to points at one horizontal position (-1/2 to 1/2)."""
         return self.ahead + self.right * a
 
     def direction(self, a: Array, b: Array) -> Array:

@@ -64,16 +64,17 @@ def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: A
 
 
 class WallShadows:
-    """Shadows of walls of one height. A shadow must not be longer than a cell, a square of the walls' grid.
+    """Shadows of walls that all have the same height.
 
-    Below the walls' tops, a ray towards a light therefore crosses at most one border of cells along x and one along y.
-    It enters the neighbouring cell along x or the one along y, and then possibly their common neighbour, the diagonal
-    one. A table states which neighbours of each cell are walls. A patch of a surface is divided by three straight
-    lines. Two lines, one for the neighbour along x and one for the neighbour along y, separate points whose rays pass
-    above the walls' height there from points whose rays do not. The third line separates points whose rays enter the
-    neighbour along x first from points whose rays enter the neighbour along y first.
+    A shadow must not be longer than a cell, a square of the walls' grid. Below the walls' tops, a ray towards a light
+    therefore crosses at most one border of cells along x and one along y. It enters the neighbouring cell along x or
+    the one along y, and then possibly their common neighbour, the diagonal one. A table states which neighbours of each
+    cell are walls. A patch of a surface is divided by three straight lines. The first line separates points whose rays
+    are above the walls' tops when they reach the neighbour along x from points whose rays are below. The second line
+    does the same for the neighbour along y. The third line separates points whose rays enter the neighbour along x
+    first from points whose rays enter the neighbour along y first.
 
-    around: table for the kernel that states, for each cell, which of its neighbours are walls; None without walls
+    around: this table, an array for the kernel; None without walls
 
     Raises:
         NoClosedForm: some walls overlap or do not fit a grid, or shadows are longer than a cell.
@@ -98,10 +99,10 @@ class WallShadows:
         self.around = floats(around)
 
     def visibility(self, patch: Patch, directions: list[list[float]], table: Array | None) -> list[Array]:
-        """Return the fraction of the patch that each light reaches.
+        """Return the fraction of a patch of a surface that the light of each lamp reaches, one array per lamp.
 
-        directions: directions towards the lights
-        table: the attribute `around`, passed as an argument of the kernel
+        directions: unit vectors towards the lamps
+        table: the attribute `around`, which states which neighbours of each cell are walls; None without walls
         """
         if table is None:
             return [mi.Float(1) for _ in directions]

@@ -1,8 +1,8 @@
-"""The fraction of an area of the visual field (`patch.Area`) that a sphere fills, and the surface visible there.
+"""The part of a sphere that is visible in an area of the visual field (`patch.Area`), and the fraction that it fills.
 
-A sphere's outline on the tangent plane is a conic. Strips of its inside are treated as parallelograms. In an ellipse,
-the parallelogram is as long as the mean chord of the strip. It then has exactly the strip's size, unless the area's
-border cuts the chord. In other outlines, the parallelogram is as long as the middle chord of the strip.
+A sphere's outline on the tangent plane is a conic. Strips of the region inside it are treated as parallelograms. In an
+ellipse, the parallelogram is as long as the mean chord of the strip. It then has exactly the strip's size, unless the
+area's border cuts the chord. In other outlines, the parallelogram is as long as the middle chord.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ NEARLY_OPEN = 1e-4  # chosen: outlines whose length exceeds about 100 times thei
 class SphereTexture:
     """A sphere's texture, which changes along one axis.
 
-    texture: index of its first texel in the tables of all textures (`StripeTables`), and its number of columns
+    texture: the texture's number of columns, and the index of its first texel in the tables of all textures
     to_column: map from texture coordinates to a column of the texture: column = to_column @ (u, v, 1)
     frame: rotation from the sphere's axes to the world's, (3, 3)
     """
@@ -68,14 +68,14 @@ class Slice:
 class Strip(Slice):
     """A strip of a sphere's visible part: a row of slices, treated as one slice.
 
-    part: rectangle that is approximately the strip, in units of the area's sides
+    part: rectangle that approximates the strip, in units of the sides of the area in which the eye sees the sphere
     """
 
     part: Rectangle
 
 
 class SphereView:
-    """The part of a sphere that is visible in an area. It is divided into strips, which are divided into slices.
+    """The part of a sphere in one area of the visual field. It is divided into strips, and each strip into slices.
 
     sides: number of strips, which is also the number of slices in each strip
     """
@@ -98,7 +98,7 @@ class SphereView:
         self.sides = dr.select(dr.norm(area.right) > WIDE, mi.UInt32(SIDES_OF_WIDE), mi.UInt32(SIDES))
 
     def whole(self) -> Strip:
-        """Return the whole visible part as one strip."""
+        """Return the sphere's whole visible part, undivided, as one `Strip`."""
         return self._between(mi.Float(0), mi.Float(1))
 
     def strip(self, number: Array) -> Strip:
@@ -107,7 +107,7 @@ class SphereView:
         return self._between(mi.Float(number) * per, (mi.Float(number) + 1) * per)
 
     def _between(self, low: Array, high: Array) -> Strip:
-        """Return the strip between two edges; 0 is the first edge of the sphere's visible part, and 1 is its last."""
+        """Return the strip between two edges, given as positions from 0 to 1 across the sphere's visible part."""
         outline = self._outline
         one, other = outline.edge(low), outline.edge(high)
         place, width = (one.place + other.place) / 2, other.place - one.place
@@ -132,10 +132,10 @@ class SphereView:
 
 @dataclass(frozen=True)
 class _Edge:
-    """An edge of a strip: a straight line across an area, the rectangle in which a sphere is seen.
+    """An edge of a strip: a straight line across the area in which a sphere is seen. The area is a rectangle.
 
     place: position of the line in the area, from -1/2 at one border to 1/2 at the opposite one
-    angle, sine: for an ellipse (`_Outline`), its parameter, and sin(angle) = (place - middle[0]) / half[0]
+    angle, sine: for an elliptic outline, an angle and its sine: sine = (place - middle[0]) / half[0], see `_Outline`
     """
 
     place: Array
@@ -145,13 +145,13 @@ class _Edge:
 
 @dataclass(frozen=True)
 class _Outline:
-    """A sphere's outline in an area, a rectangle on the eye's tangent plane. Lengths are relative to its sides.
+    """A sphere's outline in a rectangular area of the eye's tangent plane, where x and y are from -1/2 to 1/2.
 
-    closed: True if the outline is an ellipse, which the other fields describe
-    middle: middle of the ellipse, across and along the area
-    half: half of the ellipse's width across the area, and half of the chord through its middle along the area
-    slant: slope of the line through the middles of all chords along the area (0: the ellipse is not tilted)
-    low, high: angles, the ellipse's parameter, at the area's two borders, or at the ellipse's ends if these are inside
+    closed: True if the outline is an ellipse. The other fields describe this ellipse.
+    middle: x and y of the ellipse's middle
+    half: half of the ellipse's extent along x, and half the length of the chord parallel to y through its middle
+    slant: slope dy/dx of the line on which the middles of all chords parallel to y lie (0: ellipse is not tilted)
+    low, high: values of `_Edge.angle` at the lowest and the highest x of the ellipse's part in the area
     """
 
     closed: Array
@@ -162,9 +162,9 @@ class _Outline:
     high: Array
 
     def edge(self, share: Array) -> _Edge:
-        """Return an edge of the strips that divide a sphere's visible part; `share`: 0 is the first edge, 1 the last.
+        """Return the line at a position across a sphere's visible part. `share` is the position, from 0 to 1.
 
-        If the outline is an ellipse, the edge's `angle` is linear in `share`. Otherwise, the edge's `place` is.
+        For an ellipse, the line's `angle` is linear in `share`. For other outlines, its `place` is linear in `share`.
         """
         angle = dr.fma(self.high - self.low, share, self.low)
         sine = dr.sin(angle)
@@ -172,9 +172,9 @@ class _Outline:
         return _Edge(dr.clip(place, -0.5, 0.5), angle, sine)
 
     def mean_chord(self, one: _Edge, other: _Edge) -> tuple[Array, Array]:
-        """Return length and middle of the ellipse's average chord in a strip, cut off at the area's border.
+        """Return length and middle of the ellipse's mean chord in a strip. The area's border may cut this chord.
 
-        If nothing is cut off, length times the strip's width is exactly the size of the ellipse's part in the strip.
+        If it does not, the length times the strip's width is exactly the size of the ellipse's part in the strip.
         """
         double = other.sine * dr.cos(other.angle) - one.sine * dr.cos(one.angle)
         mean = (other.angle - one.angle + double) / (2 * dr.maximum(other.sine - one.sine, TINY))
@@ -222,7 +222,7 @@ def may_see(area: Area, centre: Array, radius: float) -> Array:
 
 
 def columns_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Array, tuple[Array, Array]]:
-    """Return the texture column at a patch's middle, and how many columns each of the patch's two sides spans."""
+    """Return the texture column at a patch's middle, and the numbers of columns that its two sides span."""
     to_local = mi.Matrix3f(texture.frame.T.tolist())
     n, along, across = (to_local @ mi.Vector3f(v) for v in (patch.normal, patch.along, patch.across))
     per_u, per_v, at = map(float, texture.to_column)
@@ -241,9 +241,9 @@ def columns_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Arr
 
 
 def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
-    """Return the fraction of a slice that a second sphere hides. The second sphere's outline is treated as straight.
+    """Return the fraction of a sphere's slice that a second sphere hides. The latter's outline is treated as straight.
 
-    way, radius: vector from the eye to the second sphere's centre, and radius of the second sphere [m]
+    way, radius: vector from the eye to the hiding sphere's centre, and radius of the hiding sphere [m]
     """
     seen, sides = slice_.seen, (slice_.along, slice_.across)
     length, moment = dr.norm(seen), dr.cross(way, seen)
@@ -253,11 +253,11 @@ def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
 
 
 def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array, Array]:
-    """Return the chord of a sphere's outline on a line on the tangent plane: length and middle in units of the line.
+    """Return length and middle of the part of a line that is inside a sphere's outline, in units of the line's length.
 
-    The sphere covers v = start + x · side if it is ahead and (way · v)² - tangent |v|² = q2 x² + 2 q1 x + q0 > 0.
+    The sphere covers v = start + x · side if way · v > 0 and (way · v)² - tangent |v|² = q2 x² + 2 q1 x + q0 > 0.
 
-    way, tangent: vector from the eye to the sphere's centre, and squared length of the tangents from the eye to it
+    way, tangent: vector from the eye to the sphere's centre, and |way|² minus the squared radius of the sphere
     start, side: vectors from the eye to the line's middle, and along the whole line; x is from -1/2 to 1/2
     """
     a, b = dr.dot(way, start), dr.dot(way, side)
@@ -281,11 +281,11 @@ def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array
 
 
 def _patch(way: Array, tangent: Array, seen: Array, along: Array, across: Array, origin: Array, centre: Array) -> Patch:
-    """Return the patch of a sphere around the point where the ray from the pupil along `seen` meets the sphere.
+    """Return the patch of a sphere's surface that the eye sees around the direction `seen`.
 
-    way, tangent: vector from the eye to the sphere's centre, and squared length of the tangents from the eye to it
-    along, across: sides of the parallelogram that the patch covers on the eye's tangent plane
-    origin, centre: positions of the pupil and of the sphere's centre
+    way, tangent: vector from the eye to the sphere's centre, and |way|² minus the squared radius of the sphere
+    along, across: sides of the patch's outline, a parallelogram, on the eye's tangent plane
+    origin, centre: positions of the eye's pupil and of the sphere's centre
     """
     length = dr.squared_norm(seen)
     ahead = dr.dot(way, seen)

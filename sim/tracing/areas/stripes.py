@@ -29,12 +29,12 @@ HALF_ULP = 2.0**-24  # largest relative error of a number that is rounded to flo
 
 @dataclass(frozen=True)
 class Texture:
-    """The place of a texture in the kernel's tables.
+    """The place of a texture in the tables of all textures, which a kernel reads (`StripeTables`).
 
     first: index of the first texel
     columns: number of columns
-    least_side: shortest side [texels] of a parallelogram over which the texture is averaged. `Stripes.mean_over`
-        lengthens shorter sides to this length
+    least_side: smallest allowed side [texels] of a parallelogram over which the texture is averaged.
+        `Stripes.mean_over` lengthens shorter sides to this length
     """
 
     first: Array
@@ -44,7 +44,7 @@ class Texture:
 
 @dataclass(frozen=True)
 class StripeTables:
-    """Tables of all textures, one array for each component of the light, a spectral band or a fixed spectrum.
+    """Tables of all textures, with one array per component of the light (a spectral band, or a fixed spectrum).
 
     rows: four numbers for each texel: the second and the first integral of the texture's deviation from its mean, at
         the texel's centre, and the deviations of this texel and of the next one
@@ -82,16 +82,16 @@ class Stripes:
         self.tables = StripeTables([floats(rows[:, k]) for k in count], [floats(means[:, k]) for k in count])
 
     def texture(self, first: float, columns: float) -> Texture:
-        """Return a texture for `mean_over`, given its first texel and its number of columns."""
+        """Return the texture with this number of columns and this index of its first texel, for `mean_over`."""
         return Texture(mi.Float(first), mi.Float(columns), self._least_sides[int(first)])
 
     def mean(self, texture: Texture, ends: list[Array], spread: Array | float, tables: StripeTables) -> list[Array]:
-        """Return the average of the mean reflectances of consecutive stretches of a texture.
+        """Return a texture's mean reflectance over consecutive stretches, each of which has the same weight.
 
-        There is one array for each component of the light, a spectral band or a fixed spectrum.
+        There is one array for each component of the light (a spectral band, or a fixed spectrum).
 
-        ends: ends of the stretches, in columns; texel centres are at whole numbers
-        spread: additional width of each stretch, half of it on either side
+        ends: columns at which the stretches begin and end, in order; texel centres are at whole numbers
+        spread: number of columns by which each stretch is widened, half of it on either side
         """
         found = self._mean(texture, tables)
         for one, other in pairwise(ends):
@@ -142,14 +142,14 @@ class Stripes:
         return [dr.fma(dr.fma(dr.fma((row.w - row.z) / 6, past, row.z / 2), past, row.y), past, row.x) for row in rows]
 
     def _rows(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> tuple[list[Array], Array]:
-        """Return the rows of one texel in the tables, and the distance [texels] from its centre to a position.
+        """Return a texel's row in each of the tables, and the distance [texels] from the texel's centre to a position.
 
         The position is the column `middle + beyond`. The texel is the last one whose centre is not beyond the position.
-        It has one row for each component of the light.
+        There is one table for each component of the light.
 
         The number of whole texels in `middle` is split off before `beyond` is added to the remainder, because the sum
         of a large column number and `beyond` would be rounded. A mean is computed from differences of integrals at
-        several positions, which are rounded differently, so that the errors would not cancel.
+        several positions. Rounding would change each position differently, so the errors would not cancel.
         """
         whole = dr.floor(middle)
         past = (middle - whole) + beyond
@@ -161,12 +161,12 @@ class Stripes:
 
 
 def _least_side(largest: float) -> float:
-    """Return how long a parallelogram's sides must be at least [texels] so that its mean reflectance is precise.
+    """Return the least side [texels] of parallelograms whose mean reflectance has a rounding error of at most 0.001.
 
-    The error that rounding causes is then at most 0.001. The length is at least one texel, because textures are linear
-    between texels. The mean reflectance over a parallelogram is computed from four values of the second integral of the
-    texture's deviation from its mean. Their sum is divided by the product of the parallelogram's sides. Each value is
-    rounded twice: in the table, and after the polynomial within a texel is added.
+    The length is at least one texel, because textures are linear between texels. The mean reflectance over a
+    parallelogram is computed from four values of the second integral of the texture's deviation from its mean. Their
+    sum is divided by the product of the parallelogram's sides. Each value is rounded twice: when the integral at a
+    texel's centre is stored as float32, and when the change from this centre to the position is added.
 
     largest: largest absolute value of the second integral
     """
@@ -174,5 +174,5 @@ def _least_side(largest: float) -> float:
 
 
 def _integral_up_to(steps: np.ndarray) -> np.ndarray:
-    """Return the sum of all steps before each step, along the first axis."""
+    """Return, for each entry, the sum of all entries before it along the first axis."""
     return np.cumsum(steps, axis=0) - steps
