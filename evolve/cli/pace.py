@@ -150,9 +150,9 @@ def _slowest(paces: list[Pace]) -> Pace:
 def _timed_training(config: RunConfig, animal: Phenotype, seed: int, policy: Path) -> Pace:
     """Time a training run of three short rollouts, followed by the evaluations.
 
-    The first update makes all passes over the samples. The second update makes only half as many, or
-    `learning.least_epochs` passes if this number is larger. The time of one pass follows from the difference between
-    the times of the two updates.
+    The first update makes all passes over the samples. The second update makes only half as many, but at least
+    `learning.least_epochs` passes, or all if there are fewer. The time of one pass follows from the difference between
+    the times of the two updates. It counts as 0 if both make the same number of passes.
 
     policy: path to which the trained policy is written. The parent process removes the folder of this file, even after
         Ctrl-C

@@ -79,8 +79,8 @@ class RunPlan:
     def hours(self) -> dict[str, float]:
         """Predicted wall times of the run [h], one for each measured animal, by the animal's name.
 
-        A prediction assumes that all candidates take the same time as the animal, and that they complete their
-        training.
+        A prediction assumes that all candidates take the same time as the animal, and that no training stops early. If
+        training is divided into rungs, each rung is counted only for the candidates that reach it.
         """
         search, learning = self.config.search, self.config.learning
         if search.steady_state:

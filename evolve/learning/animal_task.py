@@ -69,7 +69,8 @@ def with_phenotype(task: UserTask, phenotype: Phenotype, config: RunConfig, eyes
 
     Raises:
         ValueError: the task's method `place`, which places the eyes on the body, fails or does not return one place
-            (mount) for each eye, or the task defines no mounts, or it defines several kinds of eyes.
+            (mount) for each eye, or the task defines neither mounts nor its own `place`, or it defines several kinds
+            of eyes.
     """
     animal = with_evolved_eyes(task, eyes or phenotype.eyes(config.eye), phenotype.elevation_deg or 0.0)
     rays, bands = config.eye.rays_per_receptor, config.eye.bands

@@ -87,7 +87,7 @@ def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Orde
 
     Raises:
         OSError: a checkpoint cannot be read.
-        ConfigError: the run has a user task that the user has not named with the option --task.
+        ConfigError: the run has a user task that the user has not named on the command line or in a Python call.
     """
     phenotype = json.dumps(job.phenotype.to_json())
     task = job.config.choice.named_code

@@ -75,7 +75,10 @@ class SignsOfLife:
 
     @property
     def exhausted(self) -> bool:
-        """True if the scheduler, or every worker, has given no sign of life for at least `patience_s`."""
+        """True if the scheduler, or all workers, have given no sign of life for at least `patience_s`.
+
+        Heartbeats of workers that neither accept nor evaluate candidates do not count.
+        """
         return self.silence_s >= self.patience_s
 
     @property

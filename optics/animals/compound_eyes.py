@@ -82,7 +82,7 @@ HONEYBEES = {
 def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
     """Return an eye of a worker honeybee.
 
-    Its receptors are those that `optics.receptors_of("honeybee")` returns.
+    The result does not contain receptors; `optics.receptors_of("honeybee")` returns those of this animal.
 
     Source: Somanathan, Warrant, Borges, Wallén & Kelber, J. Exp. Biol. 212, 2448, 2009, table 1. The article
     computes acceptance angles as the rhabdom's diameter divided by the focal length. The diameters are derived from
@@ -101,7 +101,7 @@ def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
 def fruit_fly(rings: int = 15) -> AppositionEye:
     """Return an eye of *Drosophila melanogaster* with the rhabdomeres R1-6.
 
-    Its receptors are those that `optics.receptors_of("fruit_fly")` returns.
+    The result does not contain receptors; `optics.receptors_of("fruit_fly")` returns those of this animal.
 
     Source of the lens: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1. The facet's diameter of 16 µm, the
     rhabdomere's diameter of 1.9 µm and length of 80 µm, and the interommatidial angle of 5° are typical values. No
@@ -118,7 +118,7 @@ def fruit_fly(rings: int = 15) -> AppositionEye:
 def blowfly(rings: int = 20, rhabdomere: float = 2e-6) -> AppositionEye:
     """Return the frontal eye of a blowfly, *Calliphora*, with the rhabdomeres R1-6.
 
-    Its receptors are those that `optics.receptors_of("blowfly")` returns.
+    The result does not contain receptors; `optics.receptors_of("blowfly")` returns those of this animal.
 
     Source: Stavenga, J. Exp. Biol. 207, 1703, 2004, fig. 4: facets of 25 µm, an F-number of 2.2, and rhabdomeres with
     tips of 1.4 to 2 µm and a length of 250 µm, which taper to 1 µm at their ends. In the article, the taper is a
@@ -139,7 +139,7 @@ def blowfly(rings: int = 20, rhabdomere: float = 2e-6) -> AppositionEye:
 def dragonfly(rings: int = 20) -> AppositionEye:
     """Return the acute zone of a dragonfly's eye, the region with the smallest angles between ommatidia.
 
-    Its receptors are those that `optics.receptors_of("dragonfly")` returns.
+    The result does not contain receptors; `optics.receptors_of("dragonfly")` returns those of this animal.
 
     Source of the interommatidial angle of 0.24°: Land, Annu. Rev. Entomol. 42, 147, 1997. The facet's diameter of 62 µm
     is that of Sherk 1978, which was not consulted itself. No source was consulted for the focal length of three facet
@@ -156,7 +156,7 @@ def dragonfly(rings: int = 20) -> AppositionEye:
 def megalopta(rings: int = 10) -> AppositionEye:
     """Return an eye of the nocturnal bee *Megalopta genalis*.
 
-    Its receptors are those that `optics.receptors_of("honeybee")` returns.
+    The result does not contain receptors; `optics.receptors_of("honeybee")` returns receptors that suit this animal.
 
     Source: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004. Only the abstract of this article has been read.
     It states that the facets are nearly twice as wide and the rhabdoms four to five times as wide as those of bees that

@@ -262,7 +262,8 @@ def _of_circles(arc: np.ndarray, other: np.ndarray) -> np.ndarray:
 def _between(places: np.ndarray, low: float, high: float, shortest: float) -> np.ndarray:
     """Return `low`, `high` and the places between them, in ascending order.
 
-    A place is omitted if its distance from the next lower place, from `low` or from `high` is at most `shortest`.
+    Places at a distance of at most `shortest` from `low` or `high` are omitted. Of the others, a place is also omitted
+    if its distance from the next lower one is at most `shortest`.
     """
     inside = np.sort(places[(places > low + shortest) & (places < high - shortest)])
     kept = inside[np.diff(inside, prepend=low) > shortest]

@@ -117,8 +117,9 @@ def prepare(
     resolution: number of receptors (height, width).
     samples_per_receptor: number of cells along a receptor's side.
     z: distances [m] in the scene, a number or an array.
-    counts: number of depth layers, and number of zones across the longer side of the retina. "auto": the smallest
-        number that meets the tolerance. "distinct", for depth layers only: one layer at each distance.
+    counts: number of depth layers, and number of zones across the longer side of the retina. "auto": the first of
+        DEPTH_COUNTS or FIELD_COUNTS that meets the tolerance, or its part of the tolerance if both are "auto".
+        "distinct", for depth layers only: one layer at each distance.
     tolerance: largest error of a receptor's signal, relative to the signal of a white surface.
     mean: number of cells along a side of the area over which a receptor averages light (None: samples_per_receptor).
         Errors are averaged over the same area.

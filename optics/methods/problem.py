@@ -59,12 +59,10 @@ class Problem:
     spread: mean square distance of the light from the axis along one direction, in squared radii (`light_spread`).
     differentiated: True if the PSF carries derivatives.
     moves, resized: True if derivatives with respect to the distance or the radius, respectively, are requested.
-    knots: rectangles (cells) of the pupil, between the rows and columns of samples of a relief, wavefront or mask.
-        The rectangles are needed for derivatives with respect to these samples. None: there are no such derivatives.
+    knots: rectangles (cells) between samples of a relief, wavefront or mask that carry derivatives; None: none do.
     detail_part: phase [rad] below which fine detail of the pupil is neglected, divided by the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even if the window needs fewer samples.
-    steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Methods then remove light
-        beyond `reach`.
+    steep: True if most light of a steep relief misses the window. `smooth_spectrum` then removes light beyond `reach`.
     """
 
     light: Beam
@@ -137,7 +135,10 @@ class Problem:
 
     @cached_property
     def detail(self) -> float:
-        """Frequency [1/m] above which no Fourier component of phase [rad] or mask exceeds `detail_part` · tolerance."""
+        """Frequency [1/m] of fine detail in relief, wavefront and mask, which is added to the frequency due to slopes.
+
+        Above it, components of phase and mask are below `detail_part` · tolerance. Square-pixel reliefs are ignored.
+        """
         return self.light.pupil.bandwidth(self.light.wavelength, self.detail_part * self.tolerance)
 
     @cached_property
@@ -194,7 +195,7 @@ class Problem:
 
     @cached_property
     def _slopes(self) -> np.ndarray:
-        """Slopes of the wavefront over the pupil and a ring of width `_beyond_rim` around it, see `Slopes.spread`."""
+        """Slopes of the wavefront over the pupil and up to `_beyond_rim` [radii] beyond it, see `Slopes.spread`."""
         return self.slopes.spread(self._beyond_rim)
 
     @cached_property

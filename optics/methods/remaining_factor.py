@@ -46,7 +46,9 @@ class RemainingFactor:
         """Return the complex remaining factor for light that arrives at positions of the window.
 
         The slow factor is the ratio of the diffraction kernel to a Fourier kernel. The remaining factor is the slow
-        factor divided by its values at (u, 0) and at (0, v), which are called axis factors (see `AxisFactor`).
+        factor divided by two axis factors, at (u, 0) for points of the pupil with a common sine along y, and at (0, v)
+        for points with a common sine along x (see `AxisFactor`). All three are relative to their values at the middle
+        of the window.
 
         window: positions (u, v) [m] relative to the middle of the window. They have as many dimensions as the attribute
             `directions`, with which they broadcast.
@@ -61,10 +63,11 @@ class RemainingFactor:
         return values.astype(self._kind, copy=False)
 
     def divided(self, window: Pair, along: Sequence[Pair | np.ndarray]) -> np.ndarray:
-        """Return the slow factor at positions (u, v) of the window, divided by the given axis factors.
+        """Return the remaining factor at positions (u, v) of the window, given both axis factors there.
 
-        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. The axis factors are its values at
-        (u, 0) and at (0, v).
+        The slow factor, the ratio of the diffraction kernel to a Fourier kernel, is divided by its value at the middle
+        of the window and by both axis factors. The axis factors are the slow factor at (u, 0) and at (0, v), each
+        relative to its value at the middle of the window (see `AxisFactor`).
 
         window: positions (u, v) [m] relative to the middle of the window, as `rounded` returns them.
         along: amplitude and phase [waves] of the axis factors at u and at v, as `AxisFactor.at` returns them.

@@ -288,7 +288,8 @@ def _profile(edge: SoftAperture, curvature: float, dtype: str) -> np.ndarray:
 
     Its values are in the middle of equal steps of r² up to the outermost radius with light, followed by a 0.
 
-    curvature: as in `SineStack`. If not 0, the table of a circle or ring is the complex result of `curved_ring`.
+    curvature: as in `SineStack`. If not 0, the table of a circle or ring is the complex result of `curved_ring`, in
+        single precision.
     dtype: type of the table in all other cases, "float32" or "float64".
     """
     if curvature and isinstance(edge, SoftAnnulus):

@@ -179,7 +179,7 @@ class WindowGeometry:
 
     @cached_property
     def known(self) -> KeptValues:
-        """Cached results of methods. The key of a result holds the arguments of the method."""
+        """Cached results, also of functions in other modules. Geometry and key of a result determine the result."""
         return KeptValues(KEPT)
 
 

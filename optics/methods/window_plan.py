@@ -124,7 +124,8 @@ class WindowPlan:
         the typical sine along y, and the kernel along y for points with this sine along x (see `SineGeometry`).
 
         The typical sine is `WindowRays.mean_sine`, rounded to a multiple of a step, so that similar PSFs can share
-        arrays. The step is 1/ELSEWHERE of the largest sine at the rim.
+        arrays. The step is 1/ELSEWHERE of the sine of the largest angle between the axis and a line from the middle of
+        the window to the outer end of the pupil's soft edge.
         """
         step = np.minimum(self._rims[1], 1.0) / ELSEWHERE
         return np.asarray(np.rint(self._rays.mean_sine / step) * step)

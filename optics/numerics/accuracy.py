@@ -64,10 +64,11 @@ class Option:
 class Plan:
     """The chosen method with its samples and predicted error, and the reason for the choice.
 
-    samples: numbers of samples of the pupil along (y, x). Methods that sum over nodes of a quadrature rule give the
-        numbers of nodes along (radius, angle), or (number of all nodes, 1) if the nodes form no such grid.
+    samples: numbers of samples of the pupil along (y, x). If the samples are no grid of rows and columns, the value is
+        (number of samples, 1). For the method "hankel", it is (number of radii in the pupil, number of angles in the
+        spectrum).
     padding: period of the Fourier transform of the pupil, in samples, divided by the number of samples across the
-        pupil. It is 1 if the method uses no periodic transform.
+        pupil. It is 1 for methods without a padded grid of the pupil.
     predicted_error: relative L2 error of the intensity over the window.
     scalar_error: upper bound on the error of scalar theory, for light of any polarisation. It depends on the steepest
         ray and adds to `predicted_error`. All methods of `optics.psf` have this error; only `optics.vector_focus`

@@ -73,8 +73,7 @@ CALL = {
     "rayleigh_sommerfeld": 1e-3,
 }
 DFT_CALL = 2e-4  # per Fourier sum
-# A new plan and the check of a PSF. Samples for the light in the window are planned first, others after comparisons.
-PSF_CALL = {"window": 5e-3, "other": 8e-3}
+PSF_CALL = 6e-3  # per PSF with a new plan: comparing methods, planning samples, and preparing the check
 PASSAGE_CALL = {"angular_spectrum": 4e-3, "separable_kernel": 1e-3}  # per call of `optics.propagate` at a new distance
 
 # Seconds per sample, entry, node or pair.

@@ -86,7 +86,7 @@ class ModesAtPupil:
         return found / self.area
 
     def total(self, taken: np.ndarray) -> float:
-        """Return the integral of `power_on` over all directions of the light: over their sines along x and y.
+        """Return the integral of `power_on` over all sines of the light along x and y, also those above 1.
 
         `power_on` is a weighted sum over modes of the fraction of the pupil's light that enters each mode. By
         Parseval's theorem, the integral for one mode is (λ/n₀)² Σ |P Ψ|² dξ / area. λ/n₀ is the wavelength in front of

@@ -191,8 +191,7 @@ def _sampling_error(problem: Problem) -> float:
 
 def _seconds(option: Sampling, problem: Problem) -> float:
     """Return the time [s] that a PSF takes in all: for planning, computation, copying and a check of some points."""
-    call = PSF_CALL["window" if isinstance(option, WindowSampling) else "other"]
-    return call + option.seconds + window_seconds(problem) + check_seconds(problem, option)
+    return PSF_CALL + option.seconds + window_seconds(problem) + check_seconds(problem, option)
 
 
 def _bytes(option: Sampling, problem: Problem) -> float:

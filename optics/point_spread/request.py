@@ -13,6 +13,7 @@ from optics.methods.problem import Problem
 from optics.numerics.accuracy import MOST_SECONDS, AccuracyError, Plan
 from optics.numerics.arguments import one_of
 from optics.numerics.autodiff import Scalar, carries_derivative, number
+from optics.numerics.cost import PSF_CALL
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.point_spread.planner import EXACT, METHODS, choose
@@ -89,8 +90,8 @@ class Request:
             plan, sampling = choose(self.problem, self.like.method, self.most_seconds)
         except AccuracyError:
             return None
-        window = window_seconds(self.problem)
-        if plan.seconds - window > GROWN * (self.like.seconds - window):
+        fixed = PSF_CALL + window_seconds(self.problem)  # the same for all methods
+        if plan.seconds - fixed > GROWN * (self.like.seconds - fixed):
             return None
         return replace(plan, why=plan.why.replace("requested", "same method as at the previous wavelength")), sampling
 

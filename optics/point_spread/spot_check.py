@@ -157,8 +157,8 @@ def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -
 def _finer_detail(beam: Beam, problem: Problem) -> float:
     """Return the resolution of a spot check's direct sum minus that of the PSF, in cycles per pupil radius.
 
-    A PSF neglects detail of reliefs, wavefronts and masks that changes phases [rad] by less than a tenth of the PSF's
-    tolerance. The direct sum resolves finer detail, so that its comparison with the PSF shows the resulting error.
+    A PSF neglects detail that changes phases [rad] or a mask's amplitude by less than a tenth of the PSF's tolerance.
+    The direct sum resolves finer detail, so that its comparison with the PSF shows the resulting error.
     """
     fine = beam.pupil.bandwidth(beam.wavelength, FINER_DETAIL * problem.tolerance / 10)
     return problem.radius * max(fine - problem.detail, 0.0)
@@ -254,8 +254,8 @@ def _in_order(window: Grid) -> np.ndarray:
 def _by_radius(window: Grid) -> np.ndarray:
     """Return the flat indices of a window's samples in order of their distance from the axis.
 
-    `_drawn` adds up the samples' probabilities in this order, and draws a sample at equal steps of the growing sum. The
-    drawn samples are therefore spread over all bright rings.
+    For symmetric problems, `_drawn` adds up the samples' probabilities in this order, and draws a sample at equal steps
+    of the growing sum. The drawn samples are therefore spread over all bright rings.
     """
     radii = np.add.outer(np.square(window.y), np.square(window.x)).ravel()
     # Squared radii are rounded, so that rounding errors do not change the order of equal radii.

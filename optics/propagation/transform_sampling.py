@@ -158,7 +158,7 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
         longer period keeps the blur away from the window.
 
     Raises:
-        AccuracyError: the period needs more samples than the limit.
+        AccuracyError: along an axis, the transform needs more frequencies, or the window samples, than MOST_SAMPLES.
     """
     light = kept_light(passage, source, window)
     band, reach = light.band, light.reach

@@ -1,4 +1,4 @@
-"""Images of worlds for human viewers: either the world from a camera, or the signals of the learners' eyes."""
+"""Images of worlds for human viewers: the world from a camera, with agents' eyes drawn, or the learners' signals."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ class ModelSnapshot:
 
         The result is a dictionary. A key is the name of a field of `Poses`, for example "mat_rgba". The entry lists
         the ids of the elements for which this field must have the same value in every rendered world as in the model.
-        Elements that do not affect images are omitted, for example materials that no geom has.
+        Materials and height fields that do not affect images are omitted, for example materials that no geom has.
         """
         model, either = self._model, [*self._geoms, *self._hidden]
         more = {material for materials in self._drawn.values() for material in materials}

@@ -46,7 +46,7 @@ class Simulation:
     felt: for each agent, the part of its last observation that is not from eyes, as arrays (n, k) float32 by name
 
     Raises:
-        ValueError: `n` is below 1, or `least_return` is 0 or more, or it is given in a mode other than training.
+        ValueError: `n` is below 1, or `least_return` is not a number below 0, or is given in a mode besides training.
         RuntimeError: a method of a `sim.Task` fails in the first episode, which the constructor starts.
     """
 

@@ -32,7 +32,7 @@ class MediumOnRays:
 
     @classmethod
     def from_bands(cls, medium: BandMedium, basis: np.ndarray) -> MediumOnRays:
-        """Return the medium for a tracer whose components of light are the spectral bands, each multiplied by a factor.
+        """Return the medium for a tracer whose components of light are the spectral bands, each divided by a factor.
 
         basis: matrix with these factors on its diagonal and 0 elsewhere, (component, band)
         """

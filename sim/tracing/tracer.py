@@ -104,7 +104,7 @@ class Tracers:
 
     @cached_property
     def upright(self) -> UprightScene | NoClosedForm:
-        """The scene as upright walls, a floor and spheres, or the reason why it cannot be represented by them."""
+        """The scene as upright walls, a floor and spheres, or the reason why there is no such form for its eyes."""
         try:
             return upright_scene(self._scene, self._places.stand() if self._stand is None else self._stand)
         except NoClosedForm as reason:

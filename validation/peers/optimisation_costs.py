@@ -21,9 +21,10 @@ the time of the plain transform, with gradient, for the smallest number of sampl
 `optics`. "In tolerance" is its time for the smallest number of samples whose error is at most 0.01. A dash means that
 no number of samples is sufficient.
 
-**Limits.** The machine was idle during the measurement. Times of another run on it differ by up to a third, so compare
-only ratios within the table. The direction sines of the plain transform are approximations, so its error cannot fall
-below 3e-4 to 5e-3, depending on the design.
+**Limits.** The machine was idle during the measurement. In two other runs on the same day, steps took up to 1.6 times
+as long: 24 ms for 128 x 128 heights, and 18 ms for 128 x 128 pixels. Compare only ratios within the table. The
+direction sines of the plain transform are approximations, so its error cannot fall below 3e-4 to 5e-3, depending on the
+design.
 
     python -m validation.peers.optimisation_costs [--repeated N] [--out DIR] [--docs DIR]
 """

@@ -118,18 +118,12 @@ def test_limits_include_the_window():
     problem = problem_of()
     seconds, size = window_cost.window_seconds(problem), window_cost.window_bytes(problem, sampling())
     option = sampling(seconds=2.0, size=MOST_BYTES - size)
-    assert planner._seconds(option, problem) == pytest.approx(2.0 + seconds + cost.PSF_CALL["other"], rel=1e-9)
+    assert planner._seconds(option, problem) == pytest.approx(2.0 + seconds + cost.PSF_CALL, rel=1e-9)
     assert planner._within(option, problem, planner._seconds(option, problem))
     assert not planner._within(option, problem, 2.0)
     assert not planner._within(sampling(seconds=2.0, size=MOST_BYTES - size + 1), problem, 60.0)
     assert planner._cost(option, problem) == (False, 2.0)
     assert planner._cost(sampling(size=MOST_BYTES), problem) == (True, 1.0)
-
-
-def test_window_samplings_are_planned_sooner(monkeypatch):
-    other = planner._seconds(sampling(), problem_of())
-    monkeypatch.setattr(planner, "WindowSampling", SimpleNamespace)
-    assert other - planner._seconds(sampling(), problem_of()) == pytest.approx(3e-3)
 
 
 def test_verdicts():
@@ -218,8 +212,8 @@ def test_the_method_of_the_last_wavelength_is_compared_again_if_it_has_become_sl
     request = SETUP.request(LENS, 550e-9)
     assert request.most_seconds == MOST_SECONDS == 60
     plan, _ = planner.choose(request.problem, "angular_spectrum")
-    window = window_cost.window_seconds(request.problem)
-    former = replace(plan, seconds=window + share * (plan.seconds - window))
+    fixed = cost.PSF_CALL + window_cost.window_seconds(request.problem)
+    former = replace(plan, seconds=fixed + share * (plan.seconds - fixed))
     found = request.after(request, former)
     assert found.like is former
     again, _ = found.planned()

@@ -14,7 +14,7 @@ from tests.optics.point_spread.test_cost_formulas import problem_of, sampling
 @pytest.fixture
 def given(monkeypatch):
     """Return a function that chooses among given samplings, and the names of the methods that were planned."""
-    monkeypatch.setattr(planner, "PSF_CALL", {"window": 0.0, "other": 0.0})
+    monkeypatch.setattr(planner, "PSF_CALL", 0.0)
     monkeypatch.setattr(planner, "window_seconds", lambda problem: 0.0)
     monkeypatch.setattr(planner, "check_seconds", lambda problem, option: 0.0)
     monkeypatch.setattr(planner, "window_bytes", lambda *_: 0.0)
