@@ -75,7 +75,10 @@ def test_predicted_times_have_the_right_size():
 
 
 def random_psf(rng, sizes):
-    """Return a pupil's radius [m], and a function of the radius that computes a PSF. sizes: widths of windows to draw."""
+    """Return a pupil's radius [m], and a function of the radius that computes a PSF.
+
+    sizes: widths of windows to draw [samples]
+    """
     radius, f_number = 10 ** rng.uniform(-4.7, -3), rng.uniform(3, 15)
     relief = BSplineRelief(rng.uniform(0, 3e-6, (4, 4))) if rng.random() < 0.2 else None
     focal, wavelength = 2 * radius * f_number, rng.uniform(4e-7, 7e-7)
